@@ -1,0 +1,1 @@
+"""The rasterizer: moderngl on EGL or OSMesa."""

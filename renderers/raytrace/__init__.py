@@ -1,0 +1,1 @@
+"""The ray tracer: Embree packets, and the plain embreex engine that checks them."""

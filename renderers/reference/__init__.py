@@ -1,0 +1,1 @@
+"""What is true: exact images, each with its error bound."""

@@ -1,0 +1,88 @@
+"""Addressable randomness: a number for every (seed, frame, pixel, sample, dimension), in any order, on any thread.
+
+Integer hashes on 32 bits. numba widens uint32 arithmetic to 64 bits, so everything is kept in uint64 and masked back;
+the mixer is Wellons' `lowbias32` (bias .17 of an ideal hash). Every dimension hashes the seed anew: deriving one from
+another linearly showed as a bias of three standard errors.
+"""
+
+import numpy as np
+from numba import njit
+
+MASK = np.uint64(0xFFFFFFFF)
+_MULTIPLIER_1 = np.uint64(0x7FEB352D)
+_MULTIPLIER_2 = np.uint64(0x846CA68B)
+_GOLDEN = np.uint64(0x9E3779B9)
+_S15, _S16 = np.uint64(15), np.uint64(16)
+_TO_UNIT = 2.0**-32
+
+# Pixel coordinates that stand for "all pixels alike".
+SHARED = -1
+
+
+@njit(inline="always", cache=True)
+def mix32(x: int) -> int:
+    """Return a bijective scramble of the low 32 bits, as uint64."""
+    x = np.uint64(x) & MASK
+    x ^= x >> _S16
+    x = (x * _MULTIPLIER_1) & MASK
+    x ^= x >> _S15
+    x = (x * _MULTIPLIER_2) & MASK
+    x ^= x >> _S16
+    return x
+
+
+@njit(inline="always", cache=True)
+def combine(key: int, value: int) -> int:
+    """Return the hash of a key extended by one more integer (negative ones wrap)."""
+    return mix32((np.uint64(key) + _GOLDEN + (mix32(np.uint64(np.int64(value)) & MASK) ^ np.uint64(0x5BF03635))) & MASK)
+
+
+@njit(inline="always", cache=True)
+def unit(key: int, index: int) -> float:
+    """Return a number in [0, 1), a multiple of 2^-32, for one index under a key."""
+    return float(mix32((np.uint64(key) + np.uint64(index) * _GOLDEN) & MASK ^ (np.uint64(key) >> _S15))) * _TO_UNIT
+
+
+@njit(cache=True)
+def pattern_key(seed: int, frame: int, column: int, row: int) -> int:
+    """Return the key of one pixel's pattern; `column = row = SHARED` for the pattern of all pixels."""
+    key = combine(combine(0x243F6A88, seed & 0xFFFFFFFF), seed >> 32)
+    return combine(combine(combine(key, frame), column), row)
+
+
+@njit(inline="always", cache=True)
+def permute(index: int, count: int, key: int) -> int:
+    """Return where a pseudo-random permutation of range(count) takes `index` (Kensler 2013, cycle walking)."""
+    if count <= 1:
+        return 0
+    w = np.uint64(count - 1)
+    w |= w >> np.uint64(1)
+    w |= w >> np.uint64(2)
+    w |= w >> np.uint64(4)
+    w |= w >> np.uint64(8)
+    w |= w >> _S16
+    p = np.uint64(key)
+    i = np.uint64(index)
+    one = np.uint64(1)
+    while True:
+        i ^= p
+        i = (i * np.uint64(0xE170893D)) & MASK
+        i ^= p >> _S16
+        i ^= (i & w) >> np.uint64(4)
+        i ^= p >> np.uint64(8)
+        i = (i * np.uint64(0x0929EB3F)) & MASK
+        i ^= p >> np.uint64(23)
+        i ^= (i & w) >> one
+        i = (i * (one | (p >> np.uint64(27)))) & MASK
+        i = (i * np.uint64(0x6935FA69)) & MASK
+        i ^= (i & w) >> np.uint64(11)
+        i = (i * np.uint64(0x74DCB303)) & MASK
+        i ^= (i & w) >> np.uint64(2)
+        i = (i * np.uint64(0x9E501CC3)) & MASK
+        i ^= (i & w) >> np.uint64(2)
+        i = (i * np.uint64(0xC860A3DF)) & MASK
+        i &= w
+        i ^= i >> np.uint64(5)
+        if i < np.uint64(count):
+            break
+    return int((i + p) % np.uint64(count))

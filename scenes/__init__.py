@@ -1,0 +1,1 @@
+"""Scene definitions: what is true, before anybody renders it."""

@@ -1,0 +1,100 @@
+"""The camera, once for both renderers, the references and the metrics, in float64.
+
+Image coordinates: x to the right and y down, in pixels, (0, 0) the top left corner of the picture, pixel (i, j) covers
+[j, j + 1) x [i, i + 1); the camera's axis meets the picture at (width / 2, height / 2).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from aliasbench.scenes.errors import InputError
+from aliasbench.scenes.model import Animation, Camera, FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class View:
+    """A camera at one instant and one picture size.
+
+    Attributes
+    ----------
+    origin : (3,) float64
+        The camera's position in the world.
+    right, up, forward : (3,) float64
+        Orthonormal axes; `up` is up in the picture.
+    perspective : bool
+    scale : float
+        Orthographic: pixels per world unit. Perspective: pixels at distance 1 along the axis (the focal length).
+    width, height : int
+        Picture size in pixels.
+    """
+
+    origin: FloatArray
+    right: FloatArray
+    up: FloatArray
+    forward: FloatArray
+    perspective: bool
+    scale: float
+    width: int
+    height: int
+
+    def to_camera(self, points: FloatArray) -> FloatArray:
+        """Return (..., 3) coordinates along right, up and forward of world points (..., 3)."""
+        axes = np.stack([self.right, self.up, self.forward], axis=-1)
+        out: FloatArray = (np.asarray(points, dtype=np.float64) - self.origin) @ axes
+        return out
+
+    def project(self, points: FloatArray) -> FloatArray:
+        """Return (..., 3): x and y in pixels (y down) and the depth along the axis, of world points (..., 3).
+
+        Under perspective a point at depth <= 0 has no image; clip first.
+        """
+        local = self.to_camera(points)
+        scale = self.scale / local[..., 2] if self.perspective else np.full(local.shape[:-1], self.scale)
+        return np.stack(
+            [self.width / 2 + local[..., 0] * scale, self.height / 2 - local[..., 1] * scale, local[..., 2]], axis=-1
+        )
+
+    def ray(self, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return origins and directions (..., 3) in the world through image points; a direction's depth is 1."""
+        a = (np.asarray(x, dtype=np.float64)[..., None] - self.width / 2) / self.scale
+        b = (self.height / 2 - np.asarray(y, dtype=np.float64)[..., None]) / self.scale
+        plane = a * self.right + b * self.up
+        if self.perspective:
+            return np.broadcast_to(self.origin, plane.shape), plane + self.forward
+        return self.origin + plane, np.broadcast_to(self.forward, plane.shape)
+
+
+def view_at(camera: Camera, animation: Animation, frame: int, fraction: float, size: tuple[int, int]) -> View:
+    """Return the camera's view at a time (see `motion`) for a picture of `size` = (width, height) pixels.
+
+    Raises
+    ------
+    InputError
+        If the camera is degenerate at that time: position equals target, or `up` is along the axis.
+    """
+    width, height = size
+    t = (frame + fraction) / animation.fps
+    velocity = np.asarray(camera.velocity, dtype=np.float64)
+    target_velocity = velocity if camera.target_velocity is None else np.asarray(camera.target_velocity)
+    origin = np.asarray(camera.position, dtype=np.float64) + velocity * t
+    axis = np.asarray(camera.target, dtype=np.float64) - np.asarray(camera.position) + (target_velocity - velocity) * t
+    length = float(np.linalg.norm(axis))
+    if not length > 0.0:
+        raise InputError(f"camera: position equals target at t = {t:g} s; they must differ")
+    forward = axis / length
+    right = np.cross(forward, np.asarray(camera.up, dtype=np.float64))
+    norm = float(np.linalg.norm(right))
+    if not norm > 1e-12 * float(np.linalg.norm(camera.up)):
+        raise InputError(f"camera: up {list(camera.up)} is along the viewing axis; it must not be")
+    right = right / norm
+    up = np.cross(right, forward)
+    if camera.projection == "orthographic":
+        if camera.height is None:
+            raise InputError("camera: an orthographic camera needs height (world units from bottom to top)")
+        scale = height / camera.height
+    else:
+        if camera.fov_y_deg is None:
+            raise InputError("camera: a perspective camera needs fov_y_deg (degrees from bottom to top)")
+        scale = height / 2 / np.tan(np.radians(camera.fov_y_deg) / 2)
+    return View(origin, right, up, forward, camera.projection == "perspective", float(scale), width, height)

@@ -1,0 +1,152 @@
+"""What a texture's value is, and the one mip chain that both renderers filter from.
+
+Values and filtering are in linear light. An image is a grid of constant squares (point) or their bilinear blend; an
+analytic texture is evaluated exactly under point and linear, and `mip_chain` bakes one period of it otherwise, together
+with the affine map from uv to the coordinates of the baked tile, so that repeats are exact.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aliasbench.scenes.errors import InputError
+from aliasbench.scenes.model import Checker, FloatArray, Grating, ImageTexture, Texture, read_only
+
+TexelArray = NDArray[np.float32]
+BAKED_SIZE = 64  # texels across a baked period: a checker is exact at any even size
+ZONE_PLATE_SIZE = 1024  # texels across uv 0..1
+
+
+def srgb_to_linear(values: NDArray[np.floating]) -> FloatArray:
+    """Return linear light of sRGB-encoded values in [0, 1] (IEC 61966-2-1)."""
+    v = np.asarray(values, dtype=np.float64)
+    out: FloatArray = np.where(v <= 0.04045, v / 12.92, ((np.maximum(v, 0.04045) + 0.055) / 1.055) ** 2.4)
+    return out
+
+
+def linear_to_srgb(values: NDArray[np.floating]) -> FloatArray:
+    """Return sRGB-encoded values of linear light, both clamped to [0, 1]."""
+    v = np.clip(np.asarray(values, dtype=np.float64), 0.0, 1.0)
+    out: FloatArray = np.where(v <= 0.0031308, 12.92 * v, 1.055 * np.maximum(v, 0.0031308) ** (1 / 2.4) - 0.055)
+    return out
+
+
+def load_image(path: Path, *, alpha_cutoff: float | None = None, source: str | None = None) -> ImageTexture:
+    """Return an image file as linear RGBA texels, bottom row first. Integer images are sRGB, float ones linear.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, cannot be read, has no pixels, or has a value that is not finite.
+    """
+    import OpenImageIO as oiio
+
+    if not path.is_file():
+        raise InputError(f"image {str(path)!r}: no such file")
+    image = oiio.ImageInput.open(str(path))
+    if image is None:
+        raise InputError(f"image {str(path)!r}: cannot be read ({oiio.geterror().strip()})")
+    try:
+        spec = image.spec()
+        is_float = spec.format.basetype in (oiio.HALF, oiio.FLOAT, oiio.DOUBLE)
+        pixels = image.read_image(0, 0, 0, min(spec.nchannels, 4), oiio.FLOAT)
+        if pixels is None or pixels.size == 0:
+            raise InputError(f"image {str(path)!r}: cannot be read ({image.geterror().strip()})")
+    finally:
+        image.close()
+    data = np.asarray(pixels, dtype=np.float64).reshape(spec.height, spec.width, -1)
+    color = data[..., : 1 if data.shape[2] < 3 else 3]
+    alpha = data[..., -1:] if data.shape[2] in (2, 4) else np.ones_like(data[..., :1])
+    if not is_float:
+        color = srgb_to_linear(color)
+    texels = np.concatenate([np.broadcast_to(color, (*color.shape[:2], 3)), alpha], axis=2)
+    if not np.isfinite(texels).all():
+        raise InputError(f"image {str(path)!r}: has values that are not finite")
+    return ImageTexture(read_only(texels[::-1].astype(np.float32)), alpha_cutoff, source or str(path))
+
+
+def evaluate_point(texture: Texture, uv: FloatArray) -> FloatArray:
+    """Return the point-sampled RGBA value (..., 4), float64, at texture coordinates (..., 2)."""
+    u, v = np.asarray(uv, dtype=np.float64)[..., 0], np.asarray(uv, dtype=np.float64)[..., 1]
+    if isinstance(texture, ImageTexture):
+        h, w = texture.texels.shape[:2]
+        column = np.mod(np.floor(u * w), w).astype(np.int64)
+        row = np.mod(np.floor(v * h), h).astype(np.int64)
+        texels: FloatArray = texture.texels[row, column].astype(np.float64)
+        return texels
+    if isinstance(texture, Checker):
+        odd = np.mod(np.floor(u * texture.squares[0]) + np.floor(v * texture.squares[1]), 2.0)
+        share, low, high = odd, texture.black, texture.white
+    elif isinstance(texture, Grating):
+        angle = np.radians(texture.angle_deg)
+        wave = np.cos(2 * np.pi * (texture.cycles * (u * np.cos(angle) + v * np.sin(angle)) + texture.phase))
+        share, low, high = (1 + (np.sign(wave) if texture.profile == "square" else wave)) / 2, texture.low, texture.high
+    else:
+        r2 = (u - texture.center[0]) ** 2 + (v - texture.center[1]) ** 2
+        share, low, high = (1 + np.cos(texture.k * r2 + texture.phase)) / 2, (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
+    rgb = np.asarray(low) + share[..., None] * (np.asarray(high) - np.asarray(low))
+    return np.concatenate([rgb, np.ones_like(rgb[..., :1])], axis=-1)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MipChain:
+    """Levels of a texture in linear light, each half the size (rounded down, at least 1) of the one before.
+
+    Attributes
+    ----------
+    levels : tuple of (h, w, 4) float32
+        Row 0 at v = 0; level 0 is the texture itself.
+    uv_matrix : (2, 3) float64
+        Takes (u, v, 1) to the coordinates in which the chain repeats with period 1.
+    """
+
+    levels: tuple[TexelArray, ...]
+    uv_matrix: FloatArray
+
+
+def mip_chain(texture: Texture) -> MipChain:
+    """Return the mip chain of a texture; of an analytic one, of one period sampled at texel centres."""
+    matrix = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    if isinstance(texture, ImageTexture):
+        base = texture.texels.astype(np.float64)
+    elif isinstance(texture, Checker):
+        sx, sy = texture.squares
+        matrix = np.array([[sx / 2, 0.0, 0.0], [0.0, sy / 2, 0.0]])
+        base = _bake(Checker((2.0, 2.0), texture.black, texture.white), BAKED_SIZE, BAKED_SIZE)
+    elif isinstance(texture, Grating):
+        angle = np.radians(texture.angle_deg)
+        row = np.array([np.cos(angle), np.sin(angle), 0.0]) * texture.cycles
+        matrix = np.array([[row[0], row[1], texture.phase], [0.0, 0.0, 0.5]])
+        base = _bake(Grating(1.0, 0.0, 0.0, texture.profile, texture.low, texture.high), 4 * BAKED_SIZE, 1)
+    else:
+        base = _bake(texture, ZONE_PLATE_SIZE, ZONE_PLATE_SIZE)
+    levels = [read_only(base.astype(np.float32))]
+    while levels[-1].shape[0] > 1 or levels[-1].shape[1] > 1:
+        levels.append(read_only(_halve(levels[-1]).astype(np.float32)))
+    return MipChain(tuple(levels), matrix)
+
+
+def _bake(texture: Texture, width: int, height: int) -> FloatArray:
+    u, v = np.meshgrid((np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height)
+    return evaluate_point(texture, np.stack([u, v], axis=-1))
+
+
+def _halve(level: TexelArray) -> FloatArray:
+    """Return the next level: every new texel is the exact area average of the old ones it covers."""
+    out = level.astype(np.float64)
+    for axis in (0, 1):
+        n = out.shape[axis]
+        if n == 1:
+            continue
+        m = n // 2
+        moved = np.moveaxis(out, axis, 0)
+        if n == 2 * m:
+            new = (moved[0::2] + moved[1::2]) / 2
+        else:
+            # n = 2 m + 1 texels into m: new texel k covers [k n/m, (k + 1) n/m), three old ones in part
+            k = np.arange(m).reshape((m,) + (1,) * (moved.ndim - 1))
+            new = ((m - k) * moved[0:-1:2] + m * moved[1::2] + (k + 1) * moved[2::2]) / n
+        out = np.moveaxis(new, 0, axis)
+    return out
