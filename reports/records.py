@@ -1,0 +1,158 @@
+"""The records of one or several runs as typed values: the only module here that touches the untyped JSON.
+
+Everything downstream (figures, charts, tables) works on `Record`, so that a missing key or an odd value is met once,
+here, and shows on the page as a dash or a sentence instead of ending the report.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+from aliasbench.bench import export
+from aliasbench.bench.timing import TimingSummary, summarise
+from aliasbench.renderers.catalog import TECHNIQUES
+from aliasbench.scenes.errors import InputError
+
+Status = Literal["ok", "failed", "unsupported"]
+STATUSES: tuple[Status, ...] = ("ok", "failed", "unsupported")
+
+
+@dataclass(frozen=True, slots=True)
+class Score:
+    """One metric of one record: a finite value or None, the status that explains it, and further figures."""
+
+    value: float | None
+    status: str
+    extras: Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """One case of one run; `run` is the label of the run, `folder` where its image files are.
+
+    `timing` is None where nothing was timed; times are in seconds.
+    """
+
+    run: str
+    folder: Path
+    scene: str
+    technique: str
+    size: tuple[int, int]
+    seed: str
+    frames: int
+    status: str
+    error: str
+    timing: TimingSummary | None
+    setup_seconds: float | None
+    samples: int | None
+    images: Mapping[str, str] = field(default_factory=dict)
+    metrics: Mapping[str, Score] = field(default_factory=dict)
+
+    @property
+    def renderer(self) -> str:
+        """The renderer's name: what stands before the colon of the technique text."""
+        return TECHNIQUES.get(self.technique, self.technique).partition(":")[0].strip()
+
+    @property
+    def short(self) -> str:
+        """The technique in few characters, for labels in charts: values alone where they speak for themselves."""
+        head, _, tail = TECHNIQUES.get(self.technique, self.technique).partition(":")
+        parts = [p.partition("=") for p in tail.split(",") if p]
+        words = [value if key in ("sampler", "texture", "filter", "post") else f"{value} {key}" for key, _, value in parts]
+        return " ".join(words) or f"{head} 1 sample"
+
+    def value(self, metric: str) -> float | None:
+        """Return the value of a metric, None where it has none."""
+        score = self.metrics.get(metric)
+        return score.value if score else None
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """One run directory: a label unique on the page, the machine's facts and the records."""
+
+    label: str
+    suite: str
+    machine: Mapping[str, str]
+    records: tuple[Record, ...]
+
+
+def load_runs(run_dirs: Sequence[Path]) -> tuple[Run, ...]:
+    """Return the runs of some directories in the order given.
+
+    Raises
+    ------
+    InputError
+        If no directory is given, or one holds no run (the message names it).
+    """
+    if not run_dirs:
+        raise InputError("a report needs at least one run directory")
+    labels = unique_labels(run_dirs)
+    return tuple(_read_run(folder, label) for folder, label in zip(run_dirs, labels, strict=True))
+
+
+def unique_labels(run_dirs: Sequence[Path]) -> list[str]:
+    """Return one label for each directory: its name, with parents as far as needed, numbered where still the same."""
+    paths = [Path(p).resolve() for p in run_dirs]
+    deepest = max((len(p.parts) for p in paths), default=1)
+    for depth in range(1, deepest + 1):
+        labels = ["/".join(p.parts[-depth:]) for p in paths]
+        if len(set(labels)) == len(labels):
+            return labels
+    return [f"{path.name} ({number})" for number, path in enumerate(paths, 1)]
+
+
+def _read_run(folder: Path, label: str) -> Run:
+    data: Mapping[str, Any] = export.load_run(folder)
+    records = tuple(_read_record(r, folder, label) for r in data.get("records") or ())
+    return Run(label, str(data.get("suite") or ""), dict(_flatten(data.get("machine") or {})), records)
+
+
+def _read_record(r: Mapping[str, Any], folder: Path, label: str) -> Record:
+    width, height = (r.get("size") or (0, 0))[:2]
+    seconds = [float(s) for s in r.get("seconds") or ()]
+    return Record(
+        run=label,
+        folder=folder,
+        scene=str(r.get("scene", "")),
+        technique=str(r.get("technique", "")),
+        size=(int(width), int(height)),
+        seed=_plain(r.get("seed", "")),
+        frames=int(r.get("frames") or 0),
+        status=str(r.get("status", "")),
+        error=str(r.get("error") or ""),
+        timing=summarise(seconds) if seconds else None,
+        setup_seconds=_finite(r.get("setup_seconds")),
+        samples=None if r.get("samples") is None else int(r["samples"]),
+        images={str(k): str(v) for k, v in (r.get("images") or {}).items() if v},
+        metrics={str(name): _read_score(score) for name, score in (r.get("metrics") or {}).items()},
+    )
+
+
+def _read_score(score: Mapping[str, Any]) -> Score:
+    return Score(_finite(score.get("value")), str(score.get("status", "")), score.get("extras") or {})
+
+
+def _finite(value: Any) -> float | None:
+    return float(value) if isinstance(value, (int, float)) and math.isfinite(value) else None
+
+
+def _flatten(facts: Mapping[str, Any], prefix: str = "") -> list[tuple[str, str]]:
+    """Return nested facts as pairs, inner keys after their parent's: `("packages numpy", "2.4")`."""
+    pairs: list[tuple[str, str]] = []
+    for key, value in facts.items():
+        name = f"{prefix}{key}".replace("_", " ")
+        if isinstance(value, Mapping):
+            pairs += _flatten(value, f"{name} ")
+        else:
+            pairs.append((name, _plain(value)))
+    return pairs
+
+
+def _plain(value: Any) -> str:
+    """Return a JSON value as a reader would write it: lists with commas, nothing for null."""
+    if value is None:
+        return ""
+    return ", ".join(_plain(v) for v in value) if isinstance(value, (list, tuple)) else str(value)
