@@ -85,6 +85,8 @@ def _encode(path: Path, pixels: NDArray[np.floating]) -> None:
     if path.suffix == ".exr":
         spec = oiio.ImageSpec(width, height, 3, oiio.FLOAT)
         spec.attribute("compression", "zip")
+        # Otherwise the time of writing: the same pixels shall be the same bytes.
+        spec.attribute("DateTime", "1970:01:01 00:00:00")
         data = np.ascontiguousarray(pixels, dtype=np.float32)
     else:
         spec = oiio.ImageSpec(width, height, 3, oiio.UINT8)

@@ -1,41 +1,20 @@
-"""What is to be run: a suite file (TOML, schema 1) becomes a flat list of cases, every default resolved.
+"""What is to be run: a suite and the user's choices become a flat list of cases, every name checked, every default set.
 
-A case is one scene rendered by one technique at one size over some frames and seeds. All names are checked here, before
-anything is rendered; a case's id hashes everything its pixels depend on, so that the same case has the same id in every
-run and a changed scene file is noticed.
+A case is one scene rendered by one technique at one size over some frames and seeds. Everything is checked here, before
+anything is rendered; a case's id hashes everything that its pixels depend on, so that the same case has the same id in
+every run and a changed scene file is noticed.
 """
 
 import re
-import tomllib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from importlib import resources
-from pathlib import Path
-from typing import TypeVar
 
-from aliasbench.bench import values
+from aliasbench.bench.suite_file import Group, SuiteFile, read_suite
 from aliasbench.renderers.catalog import resolve_technique
 from aliasbench.renderers.technique import Technique
 from aliasbench.scenes import files
 from aliasbench.scenes.errors import InputError, unknown_name
 from aliasbench.scenes.model import Scene, content_digest
-
-SCHEMA = 1
-DEFAULT_SIZE = (256, 256)
-DEFAULT_ROUNDS = 5
-
-
-@dataclass(frozen=True, slots=True)
-class SuiteEntry:
-    """A packaged suite: what it is for, and its file below `bench/suites`."""
-
-    summary: str
-    file: str
-
-
-SUITES: Mapping[str, SuiteEntry] = {
-    "quick": SuiteEntry("five scenes, the main techniques of both renderers, at 256 x 256: about a minute", "quick.toml"),
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,16 +26,17 @@ class Case:
     id : str
         Readable, unique, fit for a file name.
     size : (width, height)
+        In pixels.
     frames : int
-        Number of frames from frame 0 that the metrics see.
+        Number of frames, from frame 0 on, that the metrics see.
     seeds : tuple of int
         Each is rendered; with more than one the metrics see them all. The first one is timed and shown.
     rounds : int
         Timed renders.
     metrics : tuple of str or None
         None: every metric.
-    truth : str
-        What a texture's true value is between texels: "point" (constant squares) or "linear".
+    texture_truth : str
+        What the reference takes a texture for between texels: "point" (constant squares) or "linear".
     """
 
     id: str
@@ -67,10 +47,10 @@ class Case:
     seeds: tuple[int, ...]
     rounds: int
     metrics: tuple[str, ...] | None
-    truth: str
+    texture_truth: str
 
     def spec(self) -> dict[str, object]:
-        """Return the case without its scene's content, as records and stores hold it."""
+        """Return the case as records and stores hold it: the scene by its name (the id holds its content)."""
         return {
             "id": self.id,
             "scene": self.scene.name,
@@ -81,13 +61,13 @@ class Case:
             "frames": self.frames,
             "rounds": self.rounds,
             "metrics": None if self.metrics is None else list(self.metrics),
-            "truth": self.truth,
+            "texture_truth": self.texture_truth,
         }
 
 
 @dataclass(frozen=True, slots=True)
-class Suite:
-    """A name and the cases in the order they are run: those of a scene follow each other."""
+class Plan:
+    """The suite's name and its cases in the order they are run: those of a scene follow each other."""
 
     name: str
     cases: tuple[Case, ...]
@@ -97,8 +77,9 @@ class Suite:
 class Request:
     """What the user asked to run, as text: enough to plan the same cases again.
 
-    `suite` is a name or a file, or None for the scenes and techniques alone; with a suite, `scenes` and `techniques`
-    choose among its cases. The other values override the suite's. `shard` = (i, n): every n-th case from the i-th.
+    `suite` is a name or a file, or None: then `scenes` by `techniques` (default: those of the quick suite). With a
+    suite, they choose among its cases. `size`, `frames`, `seeds` and `rounds` override the suite's. `shard` = (i, n)
+    keeps every n-th case from the i-th, counted from 1.
     """
 
     suite: str | None = None
@@ -111,36 +92,109 @@ class Request:
     shard: tuple[int, int] = (1, 1)
 
 
-_GROUP_KEYS: Mapping[str, Callable[[str, object], object]] = {
-    "scenes": values.texts,
-    "techniques": values.texts,
-    "size": values.size,
-    "frames": values.frames,
-    "seeds": values.seeds,
-    "rounds": values.whole(1, 100_000),
-    "metrics": values.metrics,
-    "texture_truth": values.choice("point", "linear"),
-}
-_SUITE_KEYS = ("schema", "name", "summary", "case", *_GROUP_KEYS)
-
-
-def plan(request: Request) -> Suite:
-    """Return the suite that a request asks for.
+def plan_run(request: Request) -> Plan:
+    """Return the cases that a request asks for.
 
     Raises
     ------
     InputError
-        For an unknown name, key or value, a missing or broken file, or a choice that leaves no case.
+        For an unknown name, key or value, a missing or broken file, or a case that is there twice.
     """
-    if request.suite is None:
-        if not request.scenes:
-            raise InputError("nothing to run: name a suite, or scenes with --scene")
-        techniques = request.techniques or tuple(_read(*_packaged("quick"))[1]["techniques"])  # type: ignore[arg-type]
-        table = {"scenes": request.scenes, "techniques": techniques}
-        suite = Suite("custom", _cases([table], "command line", Path.cwd(), request))
-    else:
-        where, document, folder = _document(request.suite)
-        suite = Suite(str(document.get("name", where)), _cases(_groups(document), where, folder, request))
-        suite = _choose(suite, request)
+    suite = _ad_hoc(request) if request.suite is None else read_suite(request.suite)
+    cases = _expand(suite, [_overridden(group, request) for group in suite.groups])
+    if request.suite is not None:
+        cases = _choose(cases, request)
     number, count = request.shard
-    return replace(suite, cases=suite.cases[number - 1 :: count])
+    return Plan(suite.name, tuple(cases[number - 1 :: count]))
+
+
+def _ad_hoc(request: Request) -> SuiteFile:
+    if not request.scenes:
+        raise InputError("nothing to run: name a suite, or scenes with --scene")
+    techniques = request.techniques or read_suite("quick").groups[0].techniques
+    return SuiteFile("custom", "command line", None, (Group(request.scenes, techniques),))
+
+
+def _overridden(group: Group, request: Request) -> Group:
+    return replace(
+        group,
+        size=request.size or group.size,
+        frames=request.frames or group.frames,
+        seeds=tuple(range(request.seeds)) if request.seeds else group.seeds,
+        rounds=request.rounds or group.rounds,
+    )
+
+
+def _expand(suite: SuiteFile, groups: Sequence[Group]) -> list[Case]:
+    """Return scenes x techniques of every group, each scene's cases of one size together, in order of appearance."""
+    scenes: dict[str, tuple[Scene, str]] = {}
+    names: dict[str, str] = {}
+    cases: dict[str, Case] = {}
+    for group in groups:
+        for scene_text in group.scenes:
+            if scene_text not in scenes:
+                scene = _load(suite, scene_text)
+                scenes[scene_text] = scene, content_digest(scene)
+            scene, digest = scenes[scene_text]
+            if names.setdefault(scene.name, digest) != digest:
+                raise InputError(f"{suite.where}: two different scenes are called {scene.name!r}; rename one")
+            for technique_text in group.techniques:
+                case = _case(scene, digest, _technique(suite, technique_text), group)
+                if case.id in cases:
+                    raise InputError(f"{suite.where}: {scene.name} by {case.technique.text} is there twice")
+                cases[case.id] = case
+    order = {(c.scene.name, c.size): i for i, c in reversed(list(enumerate(cases.values())))}
+    return sorted(cases.values(), key=lambda c: order[c.scene.name, c.size])
+
+
+def _load(suite: SuiteFile, text: str) -> Scene:
+    beside = suite.folder / text if suite.folder else None
+    try:
+        return files.load_scene(str(beside) if beside is not None and beside.is_file() else text)
+    except InputError as error:
+        raise InputError(f"{suite.where}: {error}") from None
+
+
+def _technique(suite: SuiteFile, text: str) -> Technique:
+    try:
+        return resolve_technique(text)
+    except InputError as error:
+        raise InputError(f"{suite.where}: {error}") from None
+
+
+def _case(scene: Scene, digest: str, technique: Technique, group: Group) -> Case:
+    frames = scene.animation.frames if group.frames == "loop" else group.frames
+    content = (digest, technique, group.size, frames, group.seeds, group.texture_truth)
+    width, height = group.size
+    slug = re.sub(r"[^A-Za-z0-9.]+", "-", f"{scene.name} {technique.text} {width}x{height}").strip("-.")[:100]
+    return Case(
+        f"{slug}-{content_digest(content)[:12]}",
+        scene,
+        technique,
+        group.size,
+        frames,
+        group.seeds,
+        group.rounds,
+        group.metrics,
+        group.texture_truth,
+    )
+
+
+def _choose(cases: list[Case], request: Request) -> list[Case]:
+    """Return the cases of the scenes and techniques asked for; a scene's name without parameters means all of them."""
+    if request.scenes:
+        names = {case.scene.name for case in cases}
+        known = names | {name.partition(":")[0] for name in names}
+        for text in request.scenes:
+            if text not in known:
+                raise unknown_name("scene of this suite:", text, known)
+        exact = names.intersection(request.scenes)
+        short = set(request.scenes) - exact
+        cases = [c for c in cases if c.scene.name in exact or c.scene.name.partition(":")[0] in short]
+    if request.techniques:
+        texts = {case.technique.text for case in cases}
+        wanted = {resolve_technique(text).text for text in request.techniques}
+        for text in sorted(wanted - texts):
+            raise unknown_name("technique of this suite:", text, texts)
+        cases = [c for c in cases if c.technique.text in wanted]
+    return cases

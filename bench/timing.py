@@ -16,6 +16,7 @@ CONFIDENCE = 0.95
 WIDE_SPREAD = 0.10
 SHORT_SECONDS = 1e-3
 FEW_ROUNDS = 5
+FAR_OUT = 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +67,8 @@ def summarise(seconds: Sequence[float]) -> TimingSummary:
     warnings = []
     if spread > WIDE_SPREAD:
         warnings.append(f"spread {spread:.0%} (over {WIDE_SPREAD:.0%})")
+    if raw.max() > FAR_OUT * median:
+        warnings.append(f"up to {raw.max() / median:.1f} times the median")
     if median < SHORT_SECONDS:
         warnings.append(f"under {SHORT_SECONDS * 1e3:.0f} ms")
     if raw.size < FEW_ROUNDS:

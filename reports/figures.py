@@ -22,8 +22,8 @@ Bytes = NDArray[np.uint8]
 # Errors are shown on a logarithmic scale: jaggies of half the contrast and noise of a thousandth are both on the page.
 HEAT_LOW, HEAT_HIGH = 1e-3, 1.0
 HEAT_LEVELS = 96
-# plotly's Inferno, from matplotlib (S. van der Walt, N. Smith): lightness rises evenly, and it survives colour blindness.
-INFERNO = "000004 1b0c41 4a0c6b 781c6d a52c60 cf4446 ed6925 fb9b06 f7d13d fcffa4".split()
+# Ten stops of Inferno (S. van der Walt, N. Smith): its lightness rises evenly, and it survives colour blindness.
+INFERNO = ["000004", "1b0c41", "4a0c6b", "781c6d", "a52c60", "cf4446", "ed6925", "fb9b06", "f7d13d", "fcffa4"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +65,8 @@ def heat_levels(test: FloatImage, reference: FloatImage, contrast: float) -> Byt
     error = np.abs(np.asarray(test, np.float64) - reference).max(axis=2) / contrast
     error = np.nan_to_num(error, nan=HEAT_HIGH, posinf=HEAT_HIGH)
     place = np.log(np.maximum(error, HEAT_LOW) / HEAT_LOW) / np.log(HEAT_HIGH / HEAT_LOW)
-    return np.rint(np.clip(place, 0.0, 1.0) * (HEAT_LEVELS - 1)).astype(np.uint8)
+    levels: Bytes = np.rint(np.clip(place, 0.0, 1.0) * (HEAT_LEVELS - 1)).astype(np.uint8)
+    return levels
 
 
 def encode_heat_map(test: FloatImage, reference: FloatImage, contrast: float) -> Picture:
@@ -78,7 +79,9 @@ def heat_palette() -> Bytes:
     """Return the (HEAT_LEVELS, 3) colours of the error scale, from no error to the full contrast."""
     stops = np.array([[int(c[i : i + 2], 16) for i in (0, 2, 4)] for c in INFERNO], float)
     at = np.linspace(0, len(stops) - 1, HEAT_LEVELS)
-    return np.rint([np.interp(at, np.arange(len(stops)), stops[:, k]) for k in range(3)]).T.astype(np.uint8)
+    channels = [np.interp(at, np.arange(len(stops)), stops[:, k]) for k in range(3)]
+    palette: Bytes = np.rint(np.stack(channels, axis=1)).astype(np.uint8)
+    return palette
 
 
 def most_telling_region(errors: Sequence[FloatImage], width: int, height: int) -> tuple[int, int]:
@@ -123,7 +126,7 @@ def png_bytes(pixels: Bytes, palette: Bytes | None = None) -> bytes:
 
 def _deflate(filter_kind: int, rows: Bytes) -> bytes:
     column = np.full((len(rows), 1), filter_kind, np.uint8)
-    return zlib.compress(np.hstack([column, rows]).tobytes(), 9)
+    return zlib.compress(np.hstack([column, rows]).tobytes(), 6)
 
 
 def _chunk(name: bytes, data: bytes) -> bytes:

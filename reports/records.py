@@ -8,7 +8,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, cast
 
 from aliasbench.bench import export
 from aliasbench.bench.timing import TimingSummary, summarise
@@ -17,6 +17,17 @@ from aliasbench.scenes.errors import InputError
 
 Status = Literal["ok", "failed", "unsupported"]
 STATUSES: tuple[Status, ...] = ("ok", "failed", "unsupported")
+# How a key of the technique text reads in a label; every other key is followed by its value.
+_WORDS: Mapping[str, str] = {
+    "spp": "{} spp",
+    "passes": "{} passes",
+    "msaa": "{}× MSAA",
+    "ssaa": "{0}×{0} SSAA",
+    "sampler": "{}",
+    "filter": "{}",
+    "texture": "{}",
+    "post": "{}",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,6 +37,11 @@ class Score:
     value: float | None
     status: str
     extras: Mapping[str, Any]
+
+    @property
+    def floor(self) -> float | None:
+        """What the value is known to be below, where the reference is too uncertain to say more."""
+        return _finite(self.extras.get("floor")) if self.status == "below_reference_floor" else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,10 +74,13 @@ class Record:
     @property
     def short(self) -> str:
         """The technique in few characters, for labels in charts: values alone where they speak for themselves."""
-        head, _, tail = TECHNIQUES.get(self.technique, self.technique).partition(":")
-        parts = [p.partition("=") for p in tail.split(",") if p]
-        words = [value if key in ("sampler", "texture", "filter", "post") else f"{value} {key}" for key, _, value in parts]
-        return " ".join(words) or f"{head} 1 sample"
+        _, _, tail = TECHNIQUES.get(self.technique, self.technique).partition(":")
+        pairs = [
+            (key.strip(), value.strip()) for key, _, value in (p.partition("=") for p in tail.split(",") if p.strip())
+        ]
+        counted = any(key in ("spp", "passes", "msaa", "ssaa", "adaptive") for key, _ in pairs)
+        words = [_WORDS.get(key, f"{key} {{}}").format(value) for key, value in pairs]
+        return " ".join(words if counted else ["1 sample", *words])
 
     def value(self, metric: str) -> float | None:
         """Return the value of a metric, None where it has none."""
@@ -75,6 +94,8 @@ class Run:
 
     label: str
     suite: str
+    started: str
+    unfinished: int
     machine: Mapping[str, str]
     records: tuple[Record, ...]
 
@@ -105,9 +126,16 @@ def unique_labels(run_dirs: Sequence[Path]) -> list[str]:
 
 
 def _read_run(folder: Path, label: str) -> Run:
-    data: Mapping[str, Any] = export.load_run(folder)
+    data = cast(Mapping[str, Any], export.load_run(folder))
     records = tuple(_read_record(r, folder, label) for r in data.get("records") or ())
-    return Run(label, str(data.get("suite") or ""), dict(_flatten(data.get("machine") or {})), records)
+    return Run(
+        label=label,
+        suite=_plain(data.get("suite")),
+        started=_plain(data.get("started")),
+        unfinished=int(data.get("unfinished") or 0),
+        machine=dict(_flatten(data.get("machine") or {})),
+        records=records,
+    )
 
 
 def _read_record(r: Mapping[str, Any], folder: Path, label: str) -> Record:
@@ -119,7 +147,7 @@ def _read_record(r: Mapping[str, Any], folder: Path, label: str) -> Record:
         scene=str(r.get("scene", "")),
         technique=str(r.get("technique", "")),
         size=(int(width), int(height)),
-        seed=_plain(r.get("seed", "")),
+        seed=_plain(r.get("seeds") or r.get("seed")),
         frames=int(r.get("frames") or 0),
         status=str(r.get("status", "")),
         error=str(r.get("error") or ""),

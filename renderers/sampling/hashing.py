@@ -43,11 +43,22 @@ def unit(key: int, index: int) -> float:
     return float(mix32((np.uint64(key) + np.uint64(index) * _GOLDEN) & MASK ^ (np.uint64(key) >> _S15))) * _TO_UNIT
 
 
+@njit(inline="always", cache=True)
+def frame_key(seed: int, frame: int) -> int:
+    """Return what the keys of all patterns of one frame start from."""
+    return combine(combine(combine(0x243F6A88, seed & 0xFFFFFFFF), seed >> 32), frame)
+
+
+@njit(inline="always", cache=True)
+def pixel_key(start: int, column: int, row: int) -> int:
+    """Return the key of one pixel's pattern from its frame's; `column = row = SHARED` for that of all pixels."""
+    return combine(combine(start, column), row)
+
+
 @njit(cache=True)
 def pattern_key(seed: int, frame: int, column: int, row: int) -> int:
     """Return the key of one pixel's pattern; `column = row = SHARED` for the pattern of all pixels."""
-    key = combine(combine(0x243F6A88, seed & 0xFFFFFFFF), seed >> 32)
-    return combine(combine(combine(key, frame), column), row)
+    return pixel_key(frame_key(seed, frame), column, row)
 
 
 @njit(inline="always", cache=True)

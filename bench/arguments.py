@@ -1,0 +1,193 @@
+"""The command line's grammar: commands, options and how their texts are read.
+
+argparse's own complaints become `InputError` like all others, so that every wrong call ends in one sentence and exit
+code 2; unknown commands and options name the nearest one.
+"""
+
+import argparse
+import re
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import NoReturn
+
+from aliasbench.scenes.errors import InputError, NotAvailableError, unknown_name
+
+MAX_SIDE = 65536
+MAX_WHOLE = 2**31 - 1
+
+COMMANDS = {
+    "doctor": "whether this machine can render, and if not, what helps",
+    "list": "the names of scenes, techniques, samplers, filters, metrics and suites",
+    "render": "one picture of a scene by a technique",
+    "run": "a suite into a run directory: pictures, metrics and times",
+    "report": "one offline HTML page from run directories",
+    "export": "the records of a run as JSON",
+    "compare": "what changed between two runs (not available yet)",
+    "history": "how results changed over many runs (not available yet)",
+    "merge": "the shards of a run as one (not available yet)",
+    "scenes": "export, check and overview of scenes (not available yet)",
+}
+NOT_YET = ("compare", "history", "merge", "scenes")
+EXECUTORS = ("local", "dask")
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser whose complaints are errors of this project."""
+
+    def error(self, message: str) -> NoReturn:
+        raise InputError(f"{message} (see {self.prog} --help)")
+
+
+def parse(arguments: Sequence[str]) -> argparse.Namespace:
+    """Return the parsed command line; `.command` is the command's name.
+
+    Raises
+    ------
+    InputError
+        For anything wrong with it.
+    NotAvailableError
+        For a command that this version does not have yet.
+    SystemExit
+        After printing help or the version.
+    """
+    parser, commands = _build()
+    words = [word for word in arguments if not word.startswith("-")]
+    wants_help = any(word in ("-h", "--help") for word in arguments)
+    if not arguments or (not words and not wants_help and "--version" not in arguments):
+        raise InputError(f"no command given; known: {', '.join(COMMANDS)} (see aliasbench --help)")
+    if words and words[0] not in COMMANDS:
+        raise unknown_name("command", words[0], COMMANDS)
+    if words and words[0] in NOT_YET and not wants_help:
+        there = ", ".join(name for name in COMMANDS if name not in NOT_YET)
+        raise NotAvailableError(f"the command {words[0]} is not available yet; available: {there}")
+    known, left_over = parser.parse_known_args(arguments)
+    if left_over:
+        raise _unexpected(left_over[0], commands[known.command])
+    return known
+
+
+def _unexpected(word: str, parser: argparse.ArgumentParser) -> InputError:
+    if not word.startswith("-"):
+        return InputError(f"{parser.prog}: unexpected {word!r} (see {parser.prog} --help)")
+    option = word.partition("=")[0]
+    return unknown_name(f"option of {parser.prog}", option, _options(parser))
+
+
+def _options(parser: argparse.ArgumentParser) -> list[str]:
+    usage = parser.format_help()
+    return sorted(set(re.findall(r"(?<![\w-])--[a-z][a-z-]*", usage)))
+
+
+def _build() -> tuple[Parser, dict[str, Parser]]:
+    parser = Parser(
+        prog="aliasbench",
+        description="How much antialiasing quality each millisecond buys, in a rasterizer and in a ray tracer.",
+        epilog="Exit codes: 0 ok, 1 failed cases or a machine that cannot render, 2 bad usage or input.",
+        allow_abbrev=False,
+    )
+    parser.add_argument("--version", action="store_true", help="print the version")
+    found = parser.add_subparsers(dest="command", metavar="COMMAND")
+    commands = {
+        name: found.add_parser(name, help=summary, description=summary, allow_abbrev=False)
+        for name, summary in COMMANDS.items()
+    }
+    _add_json(commands["doctor"])
+    section = commands["list"]
+    section.add_argument("section", nargs="?", metavar="SECTION", help="only this one")
+    _add_json(section)
+    _add_render(commands["render"])
+    _add_run(commands["run"])
+    report = commands["report"]
+    report.add_argument("run_dirs", nargs="+", type=Path, metavar="RUN_DIR")
+    report.add_argument("-o", "--output", type=Path, required=True, metavar="DIR", help="where the page goes")
+    _add_json(report)
+    export = commands["export"]
+    export.add_argument("run_dir", type=Path, metavar="RUN_DIR")
+    export.add_argument("--format", default="json", metavar="FORMAT", help="json")
+    export.add_argument("-o", "--output", type=Path, metavar="FILE", help="default: standard output")
+    return parser, commands
+
+
+def _add_json(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--json", action="store_true", help="print JSON")
+
+
+def _add_render(render: argparse.ArgumentParser) -> None:
+    render.add_argument("scene", metavar="SCENE", help="a scene's name, as in propeller:blades=5, or a file")
+    render.add_argument("technique", metavar="TECHNIQUE", help="a technique's name, or text as in raytrace:spp=4")
+    render.add_argument("-o", "--output", type=Path, required=True, metavar="OUT", help="a file, .exr or .png")
+    render.add_argument("--size", type=_read(read_size), default=(512, 512), metavar="WxH", help="default 512x512")
+    render.add_argument("--frame", type=_read(whole(0)), default=0, metavar="N", help="frame number, default 0")
+    render.add_argument("--seed", type=_read(whole(0)), default=0, metavar="N", help="default 0")
+    _add_json(render)
+
+
+def _add_run(run: argparse.ArgumentParser) -> None:
+    run.add_argument("suite", nargs="?", metavar="SUITE", help="a suite's name or file; without, give --scene")
+    run.add_argument("-o", "--output", type=Path, required=True, metavar="RUN_DIR", help="the run directory")
+    run.add_argument("--scene", action="append", default=[], metavar="S", help="only this scene; repeatable")
+    run.add_argument("--technique", action="append", default=[], metavar="T", help="only this technique; repeatable")
+    run.add_argument("--size", type=_read(read_size), metavar="WxH", help="instead of the suite's")
+    run.add_argument("--frames", type=_read(whole(1)), metavar="N", help="instead of the suite's")
+    run.add_argument("--seeds", type=_read(whole(1, 4096)), metavar="N", help="how many, instead of the suite's")
+    run.add_argument("--rounds", type=_read(whole(1, 100_000)), metavar="N", help="timed renders of each case")
+    run.add_argument("--resume", action="store_true", help="go on with the run in RUN_DIR")
+    run.add_argument("--fresh", "--overwrite", action="store_true", help="replace the run in RUN_DIR")
+    run.add_argument(
+        "--shard", type=_read(read_shard), default=(1, 1), metavar="i/n", help="every n-th case, from the i-th"
+    )
+    run.add_argument("--executor", type=_read(read_executor), default="local", metavar="E", help="local")
+    run.add_argument("--workers", type=_read(whole(1)), metavar="N", help="for --executor dask (not available yet)")
+    _add_json(run)
+
+
+def _read(reader: Callable[[str], object]) -> Callable[[str], object]:
+    """Return a reader whose sentence argparse keeps (of other errors it keeps only the value)."""
+
+    def read(text: str) -> object:
+        try:
+            return reader(text)
+        except InputError as error:
+            raise argparse.ArgumentTypeError(str(error)) from None
+
+    return read
+
+
+def whole(low: int, high: int = MAX_WHOLE) -> Callable[[str], int]:
+    """Return a reader of whole numbers of a range."""
+
+    def read(text: str) -> int:
+        if not re.fullmatch(r"[+-]?[0-9]+", text) or not low <= int(text) <= high:
+            raise InputError(f"{text!r} must be a whole number from {low} to {high}")
+        return int(text)
+
+    return read
+
+
+def read_size(text: str) -> tuple[int, int]:
+    """Return (width, height) of a text like 512x512."""
+    match = re.fullmatch(r"([0-9]+)x([0-9]+)", text)
+    if match is None:
+        raise InputError(f"{text!r} must be WIDTHxHEIGHT, as in 512x512")
+    sides = int(match[1]), int(match[2])
+    for name, side in zip(("width", "height"), sides, strict=True):
+        if not 1 <= side <= MAX_SIDE:
+            raise InputError(f"{text!r}: {name} must be from 1 to {MAX_SIDE}")
+    return sides
+
+
+def read_shard(text: str) -> tuple[int, int]:
+    """Return (i, n) of a text like 2/4, i from 1 to n."""
+    match = re.fullmatch(r"([0-9]+)/([0-9]+)", text)
+    if match is None or not 1 <= int(match[1]) <= int(match[2]):
+        raise InputError(f"{text!r} must be i/n with i from 1 to n, as in 2/4")
+    return int(match[1]), int(match[2])
+
+
+def read_executor(text: str) -> str:
+    """Return the executor's name, where it is there."""
+    if text not in EXECUTORS:
+        raise unknown_name("executor", text, EXECUTORS)
+    if text != "local":
+        raise InputError(f"executor {text} is not available yet; available: local")
+    return text

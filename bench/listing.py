@@ -1,0 +1,83 @@
+"""What there is to name on the command line and in suites, with a line on each: read from the registries."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, is_dataclass
+
+from aliasbench.bench.suite_file import SUITES
+
+Rows = list[dict[str, object]]
+
+
+def _scenes() -> Rows:
+    from aliasbench.scenes.catalog import SCENES
+
+    return [
+        {"name": name, "summary": entry.summary, "parameters": {k: _plain(p) for k, p in entry.parameters.items()}}
+        for name, entry in SCENES.items()
+    ]
+
+
+def _techniques() -> Rows:
+    from aliasbench.renderers.catalog import TECHNIQUES
+
+    return [{"name": name, "summary": text} for name, text in TECHNIQUES.items()]
+
+
+def _samplers() -> Rows:
+    from aliasbench.renderers.sampling.patterns import SAMPLERS
+    from aliasbench.renderers.technique import SAMPLER_NAMES
+
+    return [
+        {"name": name, "summary": "" if name in SAMPLERS else "not available yet", "available": name in SAMPLERS}
+        for name in SAMPLER_NAMES
+    ]
+
+
+def _filters() -> Rows:
+    from aliasbench.renderers.technique import FILTER_RADII
+
+    return [
+        {"name": name, "summary": f"radius {radius:g} pixels", "radius": radius}
+        for name, radius in FILTER_RADII.items()
+    ]
+
+
+def _metrics() -> Rows:
+    from aliasbench.metrics.catalog import METRICS
+
+    return [
+        {"name": m.name, "summary": f"{m.label} ({m.unit}; better: {m.better})", "unit": m.unit, "better": m.better}
+        for m in METRICS.values()
+    ]
+
+
+def _suites() -> Rows:
+    return [{"name": name, "summary": entry.summary} for name, entry in SUITES.items()]
+
+
+SECTIONS: Mapping[str, Callable[[], Rows]] = {
+    "scenes": _scenes,
+    "techniques": _techniques,
+    "samplers": _samplers,
+    "filters": _filters,
+    "metrics": _metrics,
+    "suites": _suites,
+}
+
+
+def _plain(parameter: object) -> object:
+    if is_dataclass(parameter) and not isinstance(parameter, type):
+        return asdict(parameter)
+    return parameter
+
+
+def describe(section: str, rows: Rows) -> list[str]:
+    """Return a section as lines for people, scenes with their parameters."""
+    width = max((len(str(row["name"])) for row in rows), default=0)
+    lines = [f"{section}:"]
+    for row in rows:
+        lines.append(f"  {row['name']!s:<{width}}  {row['summary']}".rstrip())
+        parameters = row.get("parameters")
+        for name, p in parameters.items() if isinstance(parameters, dict) else ():
+            lines.append(f"  {'':<{width}}    {name}={p['default']}: {p['meaning']} ({p['low']} to {p['high']})")
+    return lines

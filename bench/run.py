@@ -1,0 +1,281 @@
+"""The runner: references first, then every technique's pictures and their scores, then speed in interleaved rounds.
+
+Cases of one scene and size are run together, because only times measured in the same minute may be compared. What fails
+is recorded with its reason and the run goes on; what is done is committed at once and never done again, so a run that
+was killed goes on where it was and ends with the same records.
+"""
+
+import gc
+import hashlib
+import time
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import ExitStack
+from dataclasses import asdict, dataclass, field
+from itertools import groupby
+from pathlib import Path
+from typing import Any
+
+from aliasbench.bench import store as stores
+from aliasbench.bench.attempt import Attempt
+from aliasbench.bench.frames import write_image
+from aliasbench.bench.machine import describe_machine
+from aliasbench.bench.quality import MetricError, describe_nonfinite, measure_all, render_frames
+from aliasbench.bench.store import RunStore, StoredCase
+from aliasbench.bench.suite import Case, Plan, Request, plan_run
+from aliasbench.bench.timing import interleaved
+from aliasbench.bench.truth import Reference, reference_technique, render_reference
+from aliasbench.renderers import catalog
+from aliasbench.renderers.frame import Prepared
+from aliasbench.scenes.errors import InputError
+from aliasbench.scenes.model import content_digest
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """How far a run is: what it is doing now, and how many of its renders are done."""
+
+    doing: str
+    done: int
+    total: int
+
+
+OnStep = Callable[[Step], None]
+
+
+@dataclass(slots=True)
+class _Progress:
+    """Counts renders and tells the listener."""
+
+    total: int
+    on_step: OnStep | None
+    done: int = 0
+    doing: str = ""
+
+    def say(self, doing: str) -> None:
+        self.doing = doing
+        self.advance(0)
+
+    def advance(self, steps: int = 1) -> None:
+        self.done += steps
+        if self.on_step is not None:
+            self.on_step(Step(self.doing, min(self.done, self.total), self.total))
+
+
+@dataclass(slots=True)
+class _Group:
+    """What is alive while the cases of one scene and size are run: prepared techniques and references."""
+
+    store: RunStore
+    progress: _Progress
+    stack: ExitStack
+    prepared: dict[str, Prepared] = field(default_factory=dict)
+    references: dict[str, Reference | Attempt] = field(default_factory=dict)
+
+
+def start_run(
+    request: Request, run_dir: Path, *, resume: bool = False, fresh: bool = False, on_step: OnStep | None = None
+) -> None:
+    """Run what is asked for into a run directory, to the end.
+
+    Parameters
+    ----------
+    request : Request
+        With `resume` it may name nothing: then what the run began with is gone on with.
+    run_dir : Path
+        Made where it is missing.
+    resume : bool
+        Go on with the run in the directory; where it was killed before it began, begin.
+    fresh : bool
+        Replace the run in the directory.
+    on_step : callable, optional
+        Told before and after each render.
+
+    Raises
+    ------
+    InputError
+        If the request is wrong, the directory holds a run and neither `resume` nor `fresh` is given, the run to go on
+        with has other cases or was made by another machine or version, or another process writes there.
+    """
+    if resume and fresh:
+        raise InputError("--resume goes on with a run and --fresh replaces it: give one of them")
+    going_on = resume and stores.holds_run(run_dir)
+    if going_on and request == Request():
+        request = _stored_request(run_dir)
+    plan = plan_run(request)
+    facts = _facts(request, plan)
+    if going_on:
+        _refuse_other_run(run_dir, facts)
+        store = RunStore.reopen(run_dir)
+    else:
+        if resume and run_dir.is_dir() and not stores.is_untouched(run_dir):
+            raise InputError(f"{str(run_dir)!r} is no run directory: it has no {stores.DATABASE}, but other files")
+        if fresh and stores.holds_run(run_dir):
+            stores.remove_run(run_dir)
+        store = RunStore.create(run_dir, facts, [case.spec() for case in plan.cases])
+    with store:
+        execute(plan.cases, store, on_step)
+
+
+def execute(cases: Iterable[Case], store: RunStore, on_step: OnStep | None = None) -> None:
+    """Do what is left to do of the cases, in order, committing each result as soon as it is there."""
+    finished = {stored.spec["id"]: stored.is_finished for stored in store.cases()}
+    groups = [list(g) for _, g in groupby(cases, key=lambda c: (c.scene.name, c.size))]
+    groups = [[c for c in group if not finished[c.id]] for group in groups]
+    progress = _Progress(sum(_steps(group) for group in groups), on_step)
+    for group in groups:
+        if group:
+            with ExitStack() as stack:
+                live = _Group(store, progress, stack)
+                _find_quality(group, live)
+                _find_speed(group, live)
+
+
+def _steps(group: list[Case]) -> int:
+    return _reference_steps(group) + sum(c.frames * len(c.seeds) + c.rounds + 1 for c in group)
+
+
+def _reference_steps(group: list[Case]) -> int:
+    return sum(_reference_frames(group).values())
+
+
+def _reference_frames(group: list[Case]) -> Mapping[str, int]:
+    """Return how many frames of each reference the cases need."""
+    frames: dict[str, int] = {}
+    for case in group:
+        text = reference_technique(case.technique, case.texture_truth).text
+        frames[text] = max(frames.get(text, 0), case.frames)
+    return frames
+
+
+def _find_quality(group: list[Case], live: _Group) -> None:
+    """Render and measure the cases that have no outcome yet."""
+    known = {stored.spec["id"] for stored in live.store.cases() if stored.outcome is not None}
+    todo = [case for case in group if case.id not in known]
+    frames = _reference_frames(todo)
+    for case in todo:
+        text = reference_technique(case.technique, case.texture_truth).text
+        if text not in live.references:
+            live.progress.say(f"{case.scene.name}: {text}")
+            live.references[text] = _make_reference(case, frames[text], live)
+        live.progress.say(f"{case.scene.name}: {case.technique.text}")
+        attempt = Attempt()
+        with attempt:
+            outcome = _quality_of(case, live.references[text], live)
+        if attempt.error is not None:
+            live.prepared.pop(case.id, None)
+            outcome = {"status": attempt.status, "error": attempt.reason}
+        live.store.add_outcome(case.id, outcome, trace=attempt.trace)
+
+
+def _make_reference(case: Case, frames: int, live: _Group) -> Reference | Attempt:
+    technique = reference_technique(case.technique, case.texture_truth)
+    with Attempt() as attempt:
+        reference = render_reference(case.scene, technique, case.size, frames, live.progress.advance)
+        write_image(live.store.run_dir / _reference_path(case, technique.text), reference.pixels[0])
+        return reference
+    return attempt
+
+
+def _reference_path(case: Case, text: str) -> str:
+    digest = content_digest((case.scene, case.size, text))
+    return f"{stores.REFERENCES}/{digest[:24]}.exr"
+
+
+def _quality_of(case: Case, reference: Reference | Attempt, live: _Group) -> dict[str, object]:
+    """Return the outcome of a case: its pictures rendered, the first one kept, all of them measured."""
+    prepared = _prepare(case, live)
+    test, first = render_frames(case, prepared, live.progress.advance)
+    images = {"frame": f"{stores.FRAMES}/{case.id}.exr"}
+    write_image(live.store.run_dir / images["frame"], test.reshape(-1, *test.shape[-3:])[0])
+    outcome: dict[str, object] = {
+        "status": "ok",
+        "error": None,
+        "setup_seconds": first.setup_seconds,
+        "samples": int(first.samples),
+        "images": images,
+        "metrics": {},
+    }
+    if isinstance(reference, Attempt):
+        return outcome | {"status": "failed", "error": f"no reference: {reference.reason}"}
+    images["reference"] = _reference_path(case, reference.text)
+    outcome |= {"uncertainty": reference.uncertainty, "uncertainty_kind": reference.uncertainty_kind}
+    problem = describe_nonfinite(test)
+    if problem is not None:
+        outcome |= {"status": "failed", "error": problem}
+    try:
+        return outcome | {"metrics": measure_all(case, test, reference)}
+    except MetricError as error:
+        return outcome | {"status": "failed", "error": str(error)}
+
+
+def _prepare(case: Case, live: _Group) -> Prepared:
+    if case.id not in live.prepared:
+        prepared = catalog.prepare(case.scene, case.technique, size=case.size)
+        live.prepared[case.id] = live.stack.enter_context(prepared)
+    return live.prepared[case.id]
+
+
+def _find_speed(group: list[Case], live: _Group) -> None:
+    """Time the cases that came out well, in rounds interleaved over them, going on after the rounds already kept."""
+    stored = {s.spec["id"]: s for s in live.store.cases()}
+    running = [case for case in group if not stored[case.id].is_finished]
+    if not running:
+        return
+    live.progress.say(f"{running[0].scene.name}: speed")
+    broken = {case.id for case in running if _time_once(case, stored[case.id], live) is None}
+    gc.collect()
+    for number, order in interleaved(len(running), max(case.rounds for case in running)):
+        seconds: dict[str, float] = {}
+        for case in (running[i] for i in order):
+            if case.id in broken or not len(stored[case.id].seconds) <= number < case.rounds:
+                continue
+            taken = _time_once(case, stored[case.id], live)
+            if taken is None:
+                broken.add(case.id)
+            else:
+                seconds[case.id] = taken
+        live.store.add_round(number, seconds)
+
+
+def _time_once(case: Case, stored: StoredCase, live: _Group) -> float | None:
+    """Return the seconds of one more render of a case's first frame, or None, recorded, where it broke."""
+    with Attempt() as attempt:
+        seconds = _prepare(case, live).render(frame=0, seed=case.seeds[0]).seconds
+        live.progress.advance()
+        return seconds
+    failure = {"status": attempt.status, "error": f"while timing: {attempt.reason}"}
+    live.store.add_outcome(case.id, {**(stored.outcome or {}), **failure}, trace=attempt.trace)
+    return None
+
+
+def _facts(request: Request, plan: Plan) -> dict[str, Any]:
+    return {
+        "suite": plan.name,
+        "request": asdict(request),
+        "plan": hashlib.sha256(repr([case.spec() for case in plan.cases]).encode()).hexdigest(),
+        "machine": describe_machine(),
+        "started": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
+    }
+
+
+def _stored_request(run_dir: Path) -> Request:
+    stored = stores.read_facts(run_dir)["request"]
+    fields: dict[str, Any] = {key: tuple(v) if isinstance(v, list) else v for key, v in stored.items()}
+    return Request(**fields)
+
+
+def _refuse_other_run(run_dir: Path, facts: Mapping[str, Any]) -> None:
+    """Refuse to go on with a run that would not be the same run."""
+    old = stores.read_facts(run_dir)
+    if old["plan"] != facts["plan"]:
+        raise InputError(
+            f"cannot resume {str(run_dir)!r}: it holds the suite {old['suite']!r} with other cases than asked for now"
+            " (scenes, techniques, sizes, seeds or rounds differ); give another directory, or --fresh"
+        )
+    before, now = old["machine"], facts["machine"]
+    for key in sorted(before.keys() | now.keys()):
+        if before.get(key) != now.get(key):
+            raise InputError(
+                f"cannot resume {str(run_dir)!r}: its {key} was {before.get(key)!r} and is {now.get(key)!r} now; times"
+                " and pictures would not belong together; give another directory, or --fresh"
+            )

@@ -1,0 +1,167 @@
+"""The one gate that every picture passes before anything is measured: shape, type, finiteness, contrast, border.
+
+It stands before all library calls because the libraries do not look: image comparisons in common use turn one NaN into
+a small finite score, or an all-NaN picture into a perfect one. What is wrong with the suite (shapes, a broken
+reference) raises; what is wrong with the picture under test is a status that the record keeps.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aliasbench.metrics.score import Score
+from aliasbench.scenes.model import FloatArray, Scene
+
+# Rec. 709 luminance of linear RGB.
+LUMINANCE = (0.2126, 0.7152, 0.0722)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Signals:
+    """What the metrics are given: luminance in units of the scene's contrast, the border cut off, float64.
+
+    Attributes
+    ----------
+    test : (seeds, frames, h, w) float64
+    reference : (frames, h, w) float64
+    error : (seeds, frames, h, w) float64
+        test - reference, exactly 0 where they are equal.
+    test_rgb, reference_rgb : (seeds, frames, h, w, 3) and (frames, h, w, 3)
+        Linear radiance as given, the border cut off.
+    scene : Scene
+    size : (width, height)
+        Of the whole picture, in pixels.
+    crop : int
+        Pixels cut off on each side: pixel (0, 0) of the arrays is pixel (crop, crop) of the picture.
+    radius_px : float
+        Half-width of the pixel filter.
+    uncertainty : float
+        Largest error of a reference pixel, in units of the contrast.
+    frame_start : int
+        The scene's number of the first frame.
+    """
+
+    test: FloatArray
+    reference: FloatArray
+    error: FloatArray
+    test_rgb: NDArray[np.floating]
+    reference_rgb: NDArray[np.floating]
+    scene: Scene
+    size: tuple[int, int]
+    crop: int
+    radius_px: float
+    uncertainty: float
+    frame_start: int
+
+    @property
+    def seeds(self) -> int:
+        """How many independent seeds were rendered."""
+        return int(self.error.shape[0])
+
+    @property
+    def frames(self) -> int:
+        """How many frames the sequence has."""
+        return int(self.error.shape[1])
+
+    @property
+    def floor(self) -> float:
+        """Three times the reference's uncertainty, in units of the contrast."""
+        return 3.0 * self.uncertainty
+
+
+def luminance(rgb: NDArray[np.floating]) -> FloatArray:
+    """Return the luminance (...) of linear RGB (..., 3) in float64, channel by channel to spare a copy in float64."""
+    out: FloatArray = np.multiply(rgb[..., 0], LUMINANCE[0], dtype=np.float64)
+    for channel in (1, 2):
+        out += np.multiply(rgb[..., channel], LUMINANCE[channel], dtype=np.float64)
+    return out
+
+
+def open_gate(
+    test: NDArray[np.floating],
+    reference: NDArray[np.floating],
+    *,
+    scene: Scene,
+    filter_radius_px: float = 0.5,
+    reference_uncertainty: float = 0.0,
+    frame_start: int = 0,
+) -> Signals | Score:
+    """Return the signals to measure, or the score that every metric has because there is nothing to measure.
+
+    Parameters
+    ----------
+    test : (frames, h, w, 3) or (seeds, frames, h, w, 3) floating
+        Linear radiance.
+    reference : (frames, h, w, 3) floating
+        Linear radiance with the same filter and shutter.
+    scene : Scene
+        Its contrast, facts, camera and animation are used.
+    filter_radius_px : float
+        ceil of it pixels are cut off on every side of both.
+    reference_uncertainty : float
+        Bound on the reference's pixel error, in radiance.
+    frame_start : int
+        The scene's number of the first frame.
+
+    Raises
+    ------
+    ValueError
+        Integer pixels, wrong or different shapes, empty arrays, a reference that is not finite, a radius or an
+        uncertainty that is negative or not finite.
+    """
+    test, reference = np.asarray(test), np.asarray(reference)
+    for name, array in (("test", test), ("reference", reference)):
+        if not np.issubdtype(array.dtype, np.floating):
+            raise ValueError(
+                f"{name}: pixels of type {array.dtype} have no known scale; give linear radiance as floats"
+            )
+        if array.size == 0:
+            raise ValueError(f"{name}: shape {array.shape} holds no pixels")
+    if reference.ndim != 4 or reference.shape[-1] != 3:
+        raise ValueError(f"reference: shape {reference.shape}; must be (frames, h, w, 3)")
+    if test.ndim not in (4, 5) or test.shape[-4:] != reference.shape:
+        raise ValueError(
+            f"test: shape {test.shape}; must be the reference's {reference.shape}, with or without seeds before it"
+        )
+    for name, number in (("filter_radius_px", filter_radius_px), ("reference_uncertainty", reference_uncertainty)):
+        if not (math.isfinite(number) and number >= 0.0):
+            raise ValueError(f"{name} {number}: must be finite and not negative")
+    if not np.isfinite(reference).all():
+        raise ValueError(f"reference: {int(np.sum(~np.isfinite(reference)))} values are not finite")
+    test = test if test.ndim == 5 else test[None]
+    if not np.isfinite(test).all():
+        bad = ~np.isfinite(test)
+        first = np.unravel_index(int(np.argmax(bad)), bad.shape)
+        keys = ("seed", "frame", "row", "column", "channel")
+        position = dict(zip(keys, (int(i) for i in first), strict=True))
+        return Score(None, "nonfinite", {"count": int(np.sum(bad)), "first": position})
+    contrast = scene.contrast
+    if not (math.isfinite(contrast) and contrast > 0.0):
+        return Score(None, "undefined_zero_contrast", {"contrast": contrast})
+    height, width = reference.shape[1:3]
+    crop = math.ceil(filter_radius_px)
+    if min(height, width) <= 2 * crop:
+        return Score(None, "undefined_too_small", {"size": [width, height], "border": crop})
+    inside = (..., slice(crop, height - crop), slice(crop, width - crop), slice(None))
+    test, reference = test[inside], reference[inside]
+    with np.errstate(over="ignore", invalid="ignore"):
+        test_y, reference_y = (luminance(a) / contrast for a in (test, reference))
+        error = test_y - reference_y
+        uncertainty = reference_uncertainty / contrast
+    if not (np.isfinite(error).all() and math.isfinite(uncertainty)):
+        return Score(None, "overflow", {"contrast": contrast})
+    return Signals(
+        test_y,
+        reference_y,
+        error,
+        test,
+        reference,
+        scene,
+        (width, height),
+        crop,
+        filter_radius_px,
+        uncertainty,
+        frame_start,
+    )

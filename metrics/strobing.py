@@ -1,0 +1,184 @@
+"""Strobing: a rotor that seems to turn at another rate, backwards, or not at all (the wagon wheel).
+
+A blade pattern is a sum of angular orders; order m turns past a fixed point m times a revolution, and is aliased in
+time when that is half the frame rate or more. STROBE_abs is the share of the pattern that is still visible and aliased:
+a property of the shutter, which a perfect renderer does not score 0 on. STROBE_err compares with the same shutter
+rendered exactly. After Watson, Ahumada and Farrell 1986 (the window of visibility).
+"""
+
+from dataclasses import asdict, dataclass
+
+import numpy as np
+
+from aliasbench.metrics.gate import Signals
+from aliasbench.metrics.orders import Orders, is_aliased, measure_orders, noise_power, sharp_power
+from aliasbench.metrics.score import Score, rms, settle
+from aliasbench.scenes.model import FloatArray
+
+# Below this share of the duty an order is not there, and has no rate.
+NO_MODULATION = 1e-6
+AT_NYQUIST = 1e-6
+SERIES_TERMS = 100_000
+
+
+def strobe_share(orders: Orders, fps: float) -> tuple[float, dict[str, object]]:
+    """Return the visible aliased share (a square) of a rotor and what it was made from.
+
+    The orders that the annulus resolves are measured, less the noise's share. The rest of the pattern's power is known
+    in closed form, and is taken to be attenuated as the last octave of the measured ones is.
+    """
+    rotor = orders.rotor
+    k = orders.harmonics
+    noise = noise_power(orders)
+    power = np.mean(np.abs(orders.blade_coefficients) ** 2, axis=(0, 1)) - noise
+    sharp = sharp_power(rotor, k)
+    aliased = is_aliased(rotor, fps, k)
+    total = rotor.duty * (1.0 - rotor.duty)
+    octave = k > k.size / 2
+    if float(np.sum(sharp[octave])) < NO_MODULATION * total:
+        octave = k > 0
+    kept = float(np.clip(np.sum(power[octave]) / np.sum(sharp[octave]), 0.0, 1.0))
+    series = np.arange(1.0, SERIES_TERMS + 1.0)
+    unmeasured = is_aliased(rotor, fps, series) & (series > k.size)
+    # The terms left out of the series average half of 1 / (pi k)^2, on both sides of 0.
+    beyond = 1.0 / (np.pi**2 * SERIES_TERMS) if rotor.rev_per_s else 0.0
+    tail = 2.0 * float(np.sum(sharp_power(rotor, series[unmeasured]))) + beyond
+    measured = 2.0 * float(np.sum(power[aliased]))
+    share = float(np.clip((measured + kept * tail) / total, 0.0, 1.0))
+    extras: dict[str, object] = {
+        "highest_order": int(k.size) * rotor.blades,
+        "measured_share": measured / total,
+        "tail_share": tail / total,
+        "tail_kept": kept,
+        "noise_power": noise,
+    }
+    return share, extras
+
+
+def _all_orders(signals: Signals, picture: FloatArray) -> list[Orders] | Score:
+    out = []
+    for number, rotor in enumerate(signals.scene.facts.rotors):
+        orders = measure_orders(signals, picture, rotor)
+        if isinstance(orders, str):
+            return Score(None, orders, {"rotor": number})
+        out.append(orders)
+    return out
+
+
+def compute_strobing(signals: Signals) -> Score:
+    """Return STROBE_abs in [0, 1]: the root of the visible aliased share; quadratic mean over rotors."""
+    rotors = _all_orders(signals, signals.test)
+    if isinstance(rotors, Score):
+        return rotors
+    shares, extras = zip(*(strobe_share(o, signals.scene.animation.fps) for o in rotors), strict=True)
+    return Score(rms(np.sqrt(np.array(shares))), "ok", {"rotors": list(extras)})
+
+
+def compute_strobing_err(signals: Signals) -> Score:
+    """Return STROBE_err: the RMS difference of all resolved orders from the reference's, per sharp pattern's RMS."""
+    rotors = _all_orders(signals, signals.error)
+    if isinstance(rotors, Score):
+        return rotors
+    values, floors = [], []
+    for orders in rotors:
+        count = orders.coefficients.shape[-1]
+        total = np.sqrt(orders.rotor.duty * (1.0 - orders.rotor.duty))
+        values.append(rms(np.abs(orders.coefficients)) * np.sqrt(2.0 * count) / total)
+        floors.append(signals.floor / total)
+    extras = {"highest_order": [o.coefficients.shape[-1] for o in rotors], "rotors": values}
+    return settle(rms(np.array(values)), extras, floor=max(floors))
+
+
+@dataclass(frozen=True, slots=True)
+class OrderRate:
+    """How one angular order seems to turn.
+
+    Attributes
+    ----------
+    m : int
+    size : float
+        |c_m|, in units of the contrast.
+    aliased : bool
+    rev_per_s : float or None
+        In [-fps / 2m, fps / 2m); None for an order that is not there.
+    sign : int or None
+        -1, 0 or 1; None at the ends of the range, where there is no direction (the rate is then -fps / 2m).
+    """
+
+    m: int
+    size: float
+    aliased: bool
+    rev_per_s: float | None = None
+    sign: int | None = None
+
+
+def apparent_rates(orders: Orders, fps: float) -> list[OrderRate]:
+    """Return the apparent rate of every resolved multiple of the blade count."""
+    out = []
+    rotor = orders.rotor
+    for k, c in zip(orders.harmonics, np.moveaxis(orders.blade_coefficients, -1, 0), strict=True):
+        m = int(k) * rotor.blades
+        size = rms(np.abs(c))
+        aliased = bool(is_aliased(rotor, fps, np.array([k]))[0])
+        if not NO_MODULATION * rotor.duty <= size < np.inf:
+            out.append(OrderRate(m, size, aliased))
+            continue
+        phasor = c / size
+        turn = -float(np.angle(np.sum(phasor[:, 1:] * np.conj(phasor[:, :-1])))) / (2.0 * np.pi)
+        if 0.5 - abs(turn) < AT_NYQUIST:
+            out.append(OrderRate(m, size, aliased, -0.5 * fps / m))
+            continue
+        sign = 0 if abs(turn) < AT_NYQUIST else int(np.sign(turn))
+        out.append(OrderRate(m, size, aliased, turn * fps / m, sign))
+    return out
+
+
+def power_shares(rates: list[OrderRate]) -> list[tuple[float, OrderRate]]:
+    """Return the orders that have a rate, each with its share of their power."""
+    shown = [r for r in rates if r.rev_per_s is not None]
+    if not shown:
+        return []
+    relative = np.square(np.array([r.size for r in shown]) / max(r.size for r in shown))
+    return list(zip((relative / np.sum(relative)).tolist(), shown, strict=True))
+
+
+def backward_fraction(rates: list[OrderRate], rate: float) -> float | None:
+    """Return the share of the orders' power that does not seem to turn as `rate` does (undirected ones count half)."""
+    shares = power_shares(rates)
+    if rate == 0.0 or not shares:
+        return None
+    return sum(share * (0.5 if r.sign is None else float(r.sign != np.sign(rate))) for share, r in shares)
+
+
+def speed_error(rates: list[OrderRate], rate: float) -> float | None:
+    """Return the mean of |apparent - true rate| in rev/s, weighted with the orders' power."""
+    shares = power_shares(rates)
+    return sum(share * abs(r.rev_per_s - rate) for share, r in shares if r.rev_per_s is not None) if shares else None
+
+
+def compute_apparent_rate(signals: Signals) -> Score:
+    """Return the rate in rev/s at which order m = blades seems to turn, right-handed about the rotor's axis.
+
+    Of several rotors the first; extras hold all orders of all of them, the share that seems to turn backwards and the
+    mean speed error.
+    """
+    rotors = _all_orders(signals, signals.test)
+    if isinstance(rotors, Score):
+        return rotors
+    extras = []
+    first: OrderRate | None = None
+    for orders in rotors:
+        true = orders.rotor.rev_per_s
+        rates = apparent_rates(orders, signals.scene.animation.fps)
+        first = first or rates[0]
+        extras.append(
+            {
+                "true_rev_per_s": true,
+                "backward_fraction": backward_fraction(rates, true),
+                "speed_error_rev_per_s": speed_error(rates, true),
+                "orders": [asdict(r) for r in rates],
+            }
+        )
+    if first is None or first.rev_per_s is None:
+        return Score(None, "undefined_no_modulation", {"rotors": extras})
+    return Score(first.rev_per_s, "ok", {"rotors": extras, "sign": first.sign})

@@ -1,0 +1,128 @@
+"""What lies on the device for one prepared scene: vertices, matrices, textures and programs.
+
+All bodies share one vertex buffer and every vertex knows its body, whose matrix it finds in a small float texture: a
+pass over hundreds of bodies that all move differently is still one upload and one draw for each texture in use.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from aliasbench.renderers.geometry import Body
+from aliasbench.renderers.raster.graphics import GraphicsContext, read_shader
+from aliasbench.renderers.raster.minification import KINDS, MODES, Shading, make_shading, shader_coordinates
+from aliasbench.renderers.raster.projection import pack_matrices
+from aliasbench.renderers.technique import Technique
+from aliasbench.scenes.errors import InputError
+from aliasbench.scenes.model import FloatArray, Scene
+
+BODIES_PER_ROW = 1024  # as in scene.vert.glsl
+_VERTEX = np.dtype([("position", "3f4"), ("texcoord", "2f4"), ("color", "3f4"), ("body", "i4")])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Batch:
+    """The triangles with one texture."""
+
+    array: moderngl.VertexArray
+    index: moderngl.Buffer
+    shading: Shading
+
+
+def _shader(name: str, shading: Shading) -> str:
+    names = [*KINDS, *MODES]
+    lines = ["#version 330 core", *(f"#define {n} {i}" for i, n in enumerate(names))]
+    lines += [f"#define KIND {shading.kind}", f"#define MODE {shading.mode}", "#line 1"]
+    return "\n".join(lines) + "\n" + read_shader(name)
+
+
+class SceneBuffers:
+    """A scene's bodies on the device, drawn with `draw`; made and used inside the context's `use`."""
+
+    def __init__(self, context: GraphicsContext, scene: Scene, bodies: Sequence[Body], technique: Technique) -> None:
+        gl = context.gl
+        self._context = context
+        texture_names = [s.texture for s in scene.objects]
+        shadings = {
+            name: make_shading(gl, None if name is None else scene.textures[name], technique, context.max_texture_size)
+            for name in dict.fromkeys(texture_names)
+        }
+        vertices, triangles, surfaces = _gather(scene, bodies, [shadings[n] for n in texture_names])
+        self._vertices = gl.buffer(vertices.tobytes()) if len(vertices) else None
+        self._batches: list[_Batch] = []
+        for name, shading in shadings.items():
+            chosen = np.array([n == name for n in texture_names], dtype=bool)[surfaces]
+            if chosen.any():
+                self._batches.append(self._make_batch(triangles[chosen], shading))
+        self._shadings = tuple(shadings.values())
+        rows = max(1, -(-len(bodies) // BODIES_PER_ROW))
+        if rows > context.max_texture_size:
+            raise InputError(f"{len(bodies)} bodies: this device takes {context.max_texture_size * BODIES_PER_ROW}")
+        self._matrices = gl.texture((4 * min(len(bodies) or 1, BODIES_PER_ROW), rows), 4, dtype="f4")
+        self._matrices.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        self._row_length = min(len(bodies) or 1, BODIES_PER_ROW)
+
+    def _make_batch(self, triangles: NDArray[np.int32], shading: Shading) -> _Batch:
+        gl = self._context.gl
+        program = self._context.program(_shader("scene.vert.glsl", shading), _shader("scene.frag.glsl", shading))
+        index = gl.buffer(np.ascontiguousarray(triangles).tobytes())
+        # names the shader does not use are left out of a linked program
+        used = [n if n in program else None for n in _VERTEX.names or ()]
+        sizes = {"position": "3f4", "texcoord": "2f4", "color": "3f4", "body": "1i4"}
+        padding = {"3f4": "12x", "2f4": "8x", "1i4": "4x"}
+        layout = " ".join(sizes[n] if u else padding[sizes[n]] for n, u in zip(sizes, used, strict=True))
+        array = gl.vertex_array(program, [(self._vertices, layout, *(u for u in used if u))], index)
+        return _Batch(array, index, shading)
+
+    def draw(self, matrices: FloatArray) -> None:
+        """Draw every body with its matrix (n, 4, 4) into the bound target."""
+        if not self._batches:
+            return
+        self._matrices.write(pack_matrices(matrices, self._row_length).tobytes())
+        self._matrices.use(0)
+        for batch in self._batches:
+            program = batch.array.program
+            values = {**batch.shading.uniforms, "matrices": 0, "image": 1}
+            for name, value in values.items():
+                if name in program:
+                    program[name] = value
+            if batch.shading.image is not None:
+                batch.shading.image.use(1)
+            batch.array.render(moderngl.TRIANGLES)
+
+    def release(self) -> None:
+        """Free everything on the device (programs are the context's and stay)."""
+        for batch in self._batches:
+            batch.array.release()
+            batch.index.release()
+        for shading in self._shadings:
+            if shading.image is not None:
+                shading.image.release()
+        self._matrices.release()
+        if self._vertices is not None:
+            self._vertices.release()
+
+
+def _gather(
+    scene: Scene, bodies: Sequence[Body], shadings: Sequence[Shading]
+) -> tuple[NDArray[np.void], NDArray[np.int32], NDArray[np.int32]]:
+    """Return the vertices of all bodies, (m, 3) triangles in the objects' order, and each triangle's object."""
+    starts = np.cumsum([0, *(len(b.vertices) for b in bodies)])
+    vertices = np.zeros(starts[-1], _VERTEX)
+    for number, body in enumerate(bodies):
+        part = vertices[starts[number] : starts[number + 1]]
+        part["position"], part["body"] = body.vertices, number
+        for surface in np.unique(body.surfaces):
+            mine = np.unique(body.triangles[body.surfaces == surface])
+            part["color"][mine] = scene.objects[surface].color
+            part["texcoord"][mine] = shader_coordinates(shadings[surface], body.uv[mine])
+    triangles = [b.triangles + start for b, start in zip(bodies, starts, strict=False)]
+    surfaces = [b.surfaces for b in bodies]
+    if not bodies:
+        return vertices, np.zeros((0, 3), np.int32), np.zeros(0, np.int32)
+    owner = np.concatenate(surfaces)
+    order = np.argsort(owner, kind="stable")
+    return vertices, np.concatenate(triangles).astype(np.int32)[order], owner[order].astype(np.int32)

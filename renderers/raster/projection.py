@@ -1,0 +1,94 @@
+"""From a body to clip space: matrices composed in float64 for every pass and rounded to float32 only when uploaded.
+
+Rows are drawn top first: clip y points down the picture, so that OpenGL's row 0 is the picture's top row and neither
+pixels nor sample positions need turning.
+
+Depth keeps float32's relative precision wherever a camera can use it. Perspective: z / w = near / depth (reversed and
+without a far plane), so `near` is a mere unit and may be far below anything in the scene. Orthographic: depth / far, 0
+at the camera's plane, since there a plane's depth must stay linear in the picture. Either way whatever is in front of
+the camera is kept and the rest is cut.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aliasbench.renderers.geometry import LAYER_STEP
+from aliasbench.renderers.raster.placement import Placement, body_matrices
+from aliasbench.scenes.model import Camera, FloatArray, Scene
+from aliasbench.scenes.projection import View, view_at
+
+# near in units of the farthest point: small enough to cut nothing, and far from float32's smallest numbers
+_NEAR = 2.0**-24
+
+
+@dataclass(frozen=True, slots=True)
+class DepthRule:
+    """Which fragment is nearer: the comparison (ties go to the one drawn later) and the value of empty depth."""
+
+    comparison: str
+    empty: float
+
+
+def depth_rule(camera: Camera) -> DepthRule:
+    """Return the depth comparison that belongs to `clip_matrices` of this camera."""
+    return DepthRule(">=", 0.0) if camera.projection == "perspective" else DepthRule("<=", 1.0)
+
+
+def clip_matrices(
+    scene: Scene,
+    placement: Placement,
+    *,
+    size: tuple[int, int],
+    frame: int,
+    fraction: float,
+    jitter: tuple[float, float],
+    margin: int = 0,
+) -> FloatArray:
+    """Return (n, 4, 4) float64 matrices from each body's vertices to clip space at one time.
+
+    Parameters
+    ----------
+    placement : Placement
+        The scene's bodies.
+    fraction : float
+        Time within the frame interval, see `motion`.
+    jitter : (x, y)
+        In pixels, right and down: what is drawn at a pixel's centre is the picture at the centre plus the jitter.
+    margin : int
+        Pixels that the target is larger than the picture, on each side.
+    """
+    view = view_at(scene.camera, scene.animation, frame, fraction, size)
+    local = body_matrices(placement, scene.animation, frame, fraction, view.origin)
+    # Frobenius norm: no direction is stretched by more
+    reach = np.linalg.norm(local[:, :3, 3], axis=1) + placement.radii * np.linalg.norm(local[:, :3, :3], axis=(1, 2))
+    farthest = float(reach.max(initial=0.0)) or 1.0
+    camera = np.eye(4)
+    camera[:3, :3] = np.stack([view.right, view.up, view.forward])
+    clip = np.repeat((_projection(view, farthest, jitter, margin) @ camera)[None], len(local), axis=0)
+    # layer k is nearer by k steps of its distance: only the row of depth changes, never where a point is drawn
+    closer = 1.0 - LAYER_STEP * placement.layers
+    clip[:, 2] *= (1.0 / closer if view.perspective else closer)[:, None]
+    out: FloatArray = clip @ local
+    return out
+
+
+def _projection(view: View, farthest: float, jitter: tuple[float, float], margin: int) -> FloatArray:
+    """Return the (4, 4) matrix from (right, up, forward, 1) to clip space."""
+    across, down = 2 / (view.width + 2 * margin), 2 / (view.height + 2 * margin)
+    sx, sy = across * view.scale, -down * view.scale
+    jx, jy = -across * jitter[0], -down * jitter[1]
+    if view.perspective:
+        near = _NEAR * farthest
+        return np.array([[sx, 0, jx, 0], [0, sy, jy, 0], [0, 0, 0, near], [0, 0, 1, 0]])
+    # a little beyond, so that rounding cannot push the farthest point out
+    return np.array([[sx, 0, 0, jx], [0, sy, 0, jy], [0, 0, 1 / (1.01 * farthest), 0], [0, 0, 0, 1]])
+
+
+def pack_matrices(matrices: FloatArray, row_length: int) -> NDArray[np.float32]:
+    """Return (rows, 4 * row_length, 4) float32: the columns of every matrix, `row_length` matrices a row."""
+    rows = max(1, -(-len(matrices) // row_length))
+    out = np.zeros((rows * row_length, 4, 4), np.float32)
+    out[: len(matrices)] = matrices.transpose(0, 2, 1)
+    return out.reshape(rows, 4 * row_length, 4)

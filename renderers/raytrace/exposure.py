@@ -1,0 +1,97 @@
+"""What one frame is made from: when its shutter is open, what moves meanwhile, and where float32 has its origin.
+
+Still triangles are one mesh, built once. What moves while the shutter is open is traced in its own frame at every ray's
+own time (`bodies`). An instant has no such bodies: everything is placed where it is and merged, so that frame n of an
+animation is the still scene of that moment, at its speed. Only large meshes are not worth rebuilding for one picture,
+and are traced as bodies that happen not to move.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from aliasbench.renderers.geometry import Body
+from aliasbench.renderers.raytrace.bodies import Shutter
+from aliasbench.renderers.technique import Technique
+from aliasbench.scenes.model import FloatArray, Scene
+from aliasbench.scenes.projection import View, view_at
+
+# Above this many triangles an instant of a moving mesh is traced in the mesh's own frame instead of rebuilt.
+MERGE_LIMIT = 4096
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Exposure:
+    """One frame's shutter, the point float32 coordinates are relative to, and the bodies.
+
+    Attributes
+    ----------
+    shutter : Shutter
+    anchor : (3,) float64
+    still, moving : tuple of Body
+        Bodies of the merged mesh, and those that are traced in their own frame.
+    has_times : bool
+        Whether samples at different times may differ (or bodies are traced in their frames).
+    mesh_key : tuple of int
+        Equal for frames with the same merged mesh.
+    """
+
+    shutter: Shutter
+    anchor: FloatArray
+    still: tuple[Body, ...]
+    moving: tuple[Body, ...]
+    has_times: bool
+    mesh_key: tuple[int, ...]
+
+
+def plan_exposure(
+    scene: Scene, technique: Technique, size: tuple[int, int], bodies: Sequence[Body], frame: int
+) -> Exposure:
+    """Return what frame number `frame` is made from; a function of the frame alone, not of what came before."""
+    opening, closing = shutter_interval(scene, technique)
+    first = view_at(scene.camera, scene.animation, frame, opening, size)
+    last = view_at(scene.camera, scene.animation, frame, closing, size) if closing > opening else first
+    anchor_frame = _anchor_frame(scene, frame)
+    anchor = view_at(scene.camera, scene.animation, anchor_frame, 0.0, size).origin
+    shutter = Shutter(frame, opening, closing, first, last, _layer_depth(bodies, first))
+    # A layer above others is brought towards the eye, and so moves with it.
+    apart = [not b.motion.is_static or (b.layer > 0 and not scene.camera.is_static) for b in bodies]
+    restless = [b for b, is_apart in zip(bodies, apart, strict=True) if is_apart]
+    if opening == closing and sum(len(b.triangles) for b in restless) <= MERGE_LIMIT:
+        key = (anchor_frame, frame) if restless else (anchor_frame,)
+        return Exposure(shutter, anchor, tuple(bodies), (), False, key)
+    still = tuple(b for b, is_apart in zip(bodies, apart, strict=True) if not is_apart)
+    camera_moves = closing > opening and not scene.camera.is_static
+    return Exposure(shutter, anchor, still, tuple(restless), bool(restless) or camera_moves, (anchor_frame,))
+
+
+def shutter_interval(scene: Scene, technique: Technique) -> tuple[float, float]:
+    """Return the fractions of the frame interval between which samples lie; equal for an instant.
+
+    One sample at a fixed place in its stratum is at the shutter's middle, and no other time need be modelled.
+    """
+    shutter = scene.animation.shutter
+    if technique.time == "center" or (technique.spp == 1 and technique.sampler in ("center", "grid")):
+        return shutter / 2, shutter / 2
+    return 0.0, shutter
+
+
+def _anchor_frame(scene: Scene, frame: int) -> int:
+    """Return the frame whose camera position coordinates are relative to, near enough to this frame's.
+
+    Up to the target's distance away float32 loses no more than a bit; farther, the mesh is built anew.
+    """
+    camera = scene.camera
+    step = float(np.linalg.norm(camera.velocity)) / scene.animation.fps
+    if step == 0.0:
+        return 0
+    reach = float(np.linalg.norm(np.subtract(camera.target, camera.position)))
+    interval = int(max(1.0, min(reach / step, 1e9)))
+    return frame // interval * interval
+
+
+def _layer_depth(bodies: Sequence[Body], view: View) -> float:
+    """Return the distance that layers under parallel rays are a share of: the farthest resting vertex from the eye."""
+    far = [float(np.abs(b.vertices + b.origin - view.origin).max()) for b in bodies if b.layer and len(b.vertices)]
+    return max(far, default=1.0)

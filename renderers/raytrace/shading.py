@@ -1,0 +1,255 @@
+"""The colour of a packet's hits: where the ray meets the triangle's plane in float64, and the texture there.
+
+Embree says which triangle; everything after is recomputed in float64 from the ray, so that a look-up is wrong by no
+more than float64 at any distance, and equal in both engines. First every lane gets its texture coordinates and level
+of detail, then its colour. A packet that hits one triangle, or one object, throughout, which is most of them, goes
+through loops the compiler vectorises; the others go lane by lane through the same expressions. What a texture is worth
+at a place is `texturing`'s.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from aliasbench.renderers.raytrace.bodies import lane_to_body
+from aliasbench.renderers.raytrace.lanes import (
+    BLUE,
+    DX,
+    DY,
+    DZ,
+    GREEN,
+    LANES,
+    LOD,
+    LX,
+    LY,
+    LZ,
+    MX,
+    MY,
+    MZ,
+    OX,
+    OY,
+    OZ,
+    PERSPECTIVE,
+    RED,
+    RIGHT,
+    SCALE,
+    UP,
+    U,
+    V,
+)
+from aliasbench.renderers.raytrace.texturing import COLOR, KIND, LEVEL, MIPMAP, PLAIN, UV_MATRIX, shade_lane, shade_packet
+from aliasbench.scenes.model import FloatArray
+
+MISS = -1
+
+# Values of a triangle: plane n . P = k, then u = U_MAP . P + U_SHIFT and v likewise, P in the mesh's own frame.
+NORMAL, OFFSET, U_MAP, U_SHIFT, V_MAP, V_SHIFT, TRIANGLE_SIZE = 0, 3, 4, 7, 8, 11, 12
+
+
+class Tables(NamedTuple):
+    """What hits are looked up in.
+
+    Attributes
+    ----------
+    objects : (n, OBJECT_SIZE) float64
+    owners : (m,) int32
+        Object of every triangle: those of the still mesh first, then those of the moving bodies in order.
+    triangles : (m, TRIANGLE_SIZE) float64
+        Empty (0 rows) where no object has a texture.
+    bodies : (b, BODY_SIZE) float64
+    firsts : (b + 1,) int64
+        First triangle of every moving body, and the end.
+    levels : (k, 3) int64
+        First texel, width and height of every mip level.
+    texels : (t, 4) float32
+        Linear RGBA of all levels, one after the other.
+    background : (3,) float64
+    footprint : float
+        Width of a sample's footprint in pixels.
+    """
+
+    objects: FloatArray
+    owners: NDArray[np.int32]
+    triangles: FloatArray
+    bodies: FloatArray
+    firsts: NDArray[np.int64]
+    levels: NDArray[np.int64]
+    texels: NDArray[np.float32]
+    background: FloatArray
+    footprint: float
+
+
+@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+def shade_flat(tables: Tables, hits: NDArray[np.int32], scratch: FloatArray) -> None:
+    """Write the colours of hits on objects without textures."""
+    first = hits[0]
+    same = True
+    for i in range(1, LANES):
+        same &= hits[i] == first
+    if same:
+        _paint_plain(tables, first, scratch)
+        return
+    for i in range(LANES):
+        _paint_lane(tables, hits[i], scratch, i)
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def shade_textured(tables: Tables, camera: FloatArray, hits: NDArray[np.int32], scratch: FloatArray) -> None:
+    """Write the colours of hits on any objects."""
+    first = hits[0]
+    same = True
+    for i in range(1, LANES):
+        same &= hits[i] == first
+    if same and (first == MISS or tables.objects[tables.owners[first], KIND] == PLAIN):
+        _paint_plain(tables, first, scratch)
+        return
+    if same and first < tables.firsts[0]:
+        _place_packet(tables, camera, first, scratch)
+        shade_packet(tables.objects, tables.owners[first], tables.levels, tables.texels, scratch)
+        return
+    owner = tables.owners[first] if first != MISS else MISS
+    for i in range(LANES):
+        hit = hits[i]
+        if hit == MISS:
+            owner = MISS
+        else:
+            if tables.owners[hit] != owner:
+                owner = MISS
+            if tables.objects[tables.owners[hit], KIND] != PLAIN:
+                _place_lane(tables, camera, hit, scratch, i)
+    if owner != MISS and tables.objects[owner, KIND] != PLAIN:
+        shade_packet(tables.objects, owner, tables.levels, tables.texels, scratch)
+        return
+    for i in range(LANES):
+        hit = hits[i]
+        if hit == MISS or tables.objects[tables.owners[hit], KIND] == PLAIN:
+            _paint_lane(tables, hit, scratch, i)
+        else:
+            shade_lane(tables.objects, tables.owners[hit], tables.levels, tables.texels, scratch, i)
+
+
+@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+def _paint_plain(tables: Tables, hit: int, scratch: FloatArray) -> None:
+    if hit == MISS:
+        r, g, b = tables.background[0], tables.background[1], tables.background[2]
+    else:
+        owner = tables.owners[hit]
+        r, g, b = tables.objects[owner, COLOR], tables.objects[owner, COLOR + 1], tables.objects[owner, COLOR + 2]
+    for i in range(LANES):
+        scratch[RED + i], scratch[GREEN + i], scratch[BLUE + i] = r, g, b
+
+
+@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+def _paint_lane(tables: Tables, hit: int, scratch: FloatArray, i: int) -> None:
+    if hit == MISS:
+        for k in range(3):
+            scratch[RED + k * LANES + i] = tables.background[k]
+    else:
+        owner = tables.owners[hit]
+        for k in range(3):
+            scratch[RED + k * LANES + i] = tables.objects[owner, COLOR + k]
+
+
+@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+def _place(
+    row: FloatArray, scratch: FloatArray, i: int, ox: float, oy: float, oz: float, dx: float, dy: float, dz: float
+) -> float:
+    """Write where the ray meets the triangle's plane, in texture coordinates; return the ray parameter there."""
+    t = (row[OFFSET] - (row[0] * ox + row[1] * oy + row[2] * oz)) / (row[0] * dx + row[1] * dy + row[2] * dz)
+    x, y, z = ox + t * dx, oy + t * dy, oz + t * dz
+    scratch[U + i] = row[U_MAP] * x + row[U_MAP + 1] * y + row[U_MAP + 2] * z + row[U_SHIFT]
+    scratch[V + i] = row[V_MAP] * x + row[V_MAP + 1] * y + row[V_MAP + 2] * z + row[V_SHIFT]
+    return t
+
+
+@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+def _stretch(
+    row: FloatArray, values: FloatArray, width: float, height: float, weight: float,
+    qx: float, qy: float, qz: float, dx: float, dy: float, dz: float,
+) -> float:  # fmt: skip
+    """Return the squared distance in texels of level 0 that the look-up moves with the image point (see `_measure`)."""
+    along = (row[0] * qx + row[1] * qy + row[2] * qz) / (row[0] * dx + row[1] * dy + row[2] * dz)
+    x, y, z = weight * (qx - along * dx), weight * (qy - along * dy), weight * (qz - along * dz)
+    du = row[U_MAP] * x + row[U_MAP + 1] * y + row[U_MAP + 2] * z
+    dv = row[V_MAP] * x + row[V_MAP + 1] * y + row[V_MAP + 2] * z
+    s = (values[UV_MATRIX] * du + values[UV_MATRIX + 1] * dv) * width
+    r = (values[UV_MATRIX + 3] * du + values[UV_MATRIX + 4] * dv) * height
+    return s * s + r * r
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def _place_packet(tables: Tables, camera: FloatArray, hit: int, scratch: FloatArray) -> None:
+    """Write texture coordinates, and levels of detail where needed, of 16 hits on one triangle that stands still.
+
+    The level is log2 of the footprint's longer side in texels of level 0 (OpenGL 4.6, 8.14.1). The ray meets the plane
+    at P = O + t D. When the image point moves by a pixel, O (parallel rays) or D (perspective) moves by w q, w = 1 or t
+    pixels, and P by w (q - D (n . q) / (n . D)).
+    """
+    row = tables.triangles[hit]
+    values = tables.objects[tables.owners[hit]]
+    for i in range(LANES):
+        _place(
+            row, scratch, i, scratch[OX + i], scratch[OY + i], scratch[OZ + i],
+            scratch[DX + i], scratch[DY + i], scratch[DZ + i],
+        )  # fmt: skip
+    if values[KIND] < MIPMAP:
+        return
+    step = tables.footprint / camera[SCALE]
+    perspective = camera[PERSPECTIVE]
+    level = int(values[LEVEL])
+    width, height = float(tables.levels[level, 1]), float(tables.levels[level, 2])
+    rx, ry, rz = camera[RIGHT], camera[RIGHT + 1], camera[RIGHT + 2]
+    ux, uy, uz = camera[UP], camera[UP + 1], camera[UP + 2]
+    for i in range(LANES):
+        dx, dy, dz = scratch[DX + i], scratch[DY + i], scratch[DZ + i]
+        t = _place(row, scratch, i, scratch[OX + i], scratch[OY + i], scratch[OZ + i], dx, dy, dz)
+        weight = step * (1.0 + perspective * (t - 1.0))
+        across = _stretch(row, values, width, height, weight, rx, ry, rz, dx, dy, dz)
+        down = _stretch(row, values, width, height, weight, ux, uy, uz, dx, dy, dz)
+        scratch[LOD + i] = max(across, down)
+    for i in range(LANES):
+        scratch[LOD + i] = 0.5 * np.log2(max(scratch[LOD + i], 1e-300))
+
+
+@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+def _place_lane(tables: Tables, camera: FloatArray, hit: int, scratch: FloatArray, i: int) -> None:
+    """Write texture coordinates, and the level of detail where needed, of one hit on anything (see `_place_packet`)."""
+    row = tables.triangles[hit]
+    values = tables.objects[tables.owners[hit]]
+    ox, oy, oz = scratch[OX + i], scratch[OY + i], scratch[OZ + i]
+    dx, dy, dz = scratch[DX + i], scratch[DY + i], scratch[DZ + i]
+    in_body = hit >= tables.firsts[0]
+    body = 0
+    if in_body:
+        while hit >= tables.firsts[body + 1]:
+            body += 1
+        lane_to_body(tables.bodies[body], scratch, i)
+        ox, oy, oz = scratch[LX + i], scratch[LY + i], scratch[LZ + i]
+        dx, dy, dz = scratch[MX + i], scratch[MY + i], scratch[MZ + i]
+    t = _place(row, scratch, i, ox, oy, oz, dx, dy, dz)
+    if values[KIND] < MIPMAP:
+        return
+    weight = tables.footprint / camera[SCALE] * (1.0 + camera[PERSPECTIVE] * (t - 1.0))
+    level = int(values[LEVEL])
+    width, height = float(tables.levels[level, 1]), float(tables.levels[level, 2])
+    longest = 1e-300
+    for axis in (RIGHT, UP):
+        qx, qy, qz = camera[axis], camera[axis + 1], camera[axis + 2]
+        if in_body:
+            qx, qy, qz = _direction_to_body(tables.bodies[body], scratch, i, qx, qy, qz)
+        longest = max(longest, _stretch(row, values, width, height, weight, qx, qy, qz, dx, dy, dz))
+    scratch[LOD + i] = 0.5 * np.log2(longest)
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def _direction_to_body(
+    values: FloatArray, scratch: FloatArray, i: int, x: float, y: float, z: float
+) -> tuple[float, float, float]:
+    """Return a direction at the time of lane i in the body's frame (directions are mapped linearly)."""
+    dx, dy, dz = scratch[DX + i], scratch[DY + i], scratch[DZ + i]
+    scratch[DX + i], scratch[DY + i], scratch[DZ + i] = x, y, z
+    lane_to_body(values, scratch, i)
+    scratch[DX + i], scratch[DY + i], scratch[DZ + i] = dx, dy, dz
+    return scratch[MX + i], scratch[MY + i], scratch[MZ + i]

@@ -1,0 +1,242 @@
+"""The scene as the kernels want it: one still mesh in float32 near the camera, moving bodies, and look-up tables."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aliasbench.renderers.geometry import Body
+from aliasbench.renderers.raytrace.bodies import Shutter, layer_matrix
+from aliasbench.renderers.raytrace.lanes import (
+    AXIS,
+    AXIS_TRAVEL,
+    CAMERA_SIZE,
+    CENTER_X,
+    CENTER_Y,
+    EYE,
+    EYE_TRAVEL,
+    FORWARD,
+    PERSPECTIVE,
+    RIGHT,
+    SCALE,
+    TURNING,
+    UP,
+    UP_HINT,
+)
+from aliasbench.renderers.raytrace.shading import (
+    NORMAL,
+    OFFSET,
+    TRIANGLE_SIZE,
+    U_MAP,
+    U_SHIFT,
+    V_MAP,
+    V_SHIFT,
+    Tables,
+)
+from aliasbench.renderers.raytrace.texturing import (
+    CHECKER,
+    COLOR,
+    KIND,
+    LEVEL,
+    LEVELS,
+    LOW,
+    MIPMAP,
+    NEAREST,
+    OBJECT_SIZE,
+    PHASE,
+    PLACE,
+    PLAIN,
+    RATE,
+    SINE,
+    SPAN,
+    SQUARE,
+    TRILINEAR,
+    UV_MATRIX,
+    ZONE,
+)
+from aliasbench.scenes.model import Checker, FloatArray, Grating, ImageTexture, Scene, Texture
+from aliasbench.scenes.motion import object_matrix
+from aliasbench.scenes.textures import MipChain, mip_chain
+
+_CHAIN_KIND = {"point": NEAREST, "linear": TRILINEAR, "mipmap": MIPMAP, "trilinear": TRILINEAR}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Mesh:
+    """Triangles in one frame of reference: `vertices` (n, 3) float64, `triangles` (m, 3), `uv` (n, 2), `owners` (m,)."""
+
+    vertices: FloatArray
+    triangles: NDArray[np.int32]
+    uv: FloatArray
+    owners: NDArray[np.int32]
+
+
+def body_mesh(body: Body) -> Mesh:
+    """Return a body's triangles in the body's own frame."""
+    return Mesh(body.vertices, body.triangles, body.uv, body.surfaces)
+
+
+def merge_bodies(scene: Scene, bodies: Sequence[Body], shutter: Shutter, anchor: FloatArray) -> Mesh:
+    """Return bodies as they stand when the shutter opens, relative to `anchor`, as one mesh."""
+    vertices, triangles, count = [np.zeros((0, 3))], [np.zeros((0, 3), np.int32)], 0
+    for body in bodies:
+        world = object_matrix(body.motion, scene.animation, shutter.frame, shutter.opening)
+        matrix = body.local_matrix(world, anchor)
+        if body.layer:
+            matrix = layer_matrix(shutter.first, body.layer, shutter.layer_depth, anchor) @ matrix
+        vertices.append(body.vertices @ matrix[:3, :3].T + matrix[:3, 3])
+        triangles.append(body.triangles + np.int32(count))
+        count += len(body.vertices)
+    return Mesh(
+        np.concatenate(vertices),
+        np.concatenate(triangles),
+        np.concatenate([np.zeros((0, 2)), *(body.uv for body in bodies)]),
+        np.concatenate([np.zeros(0, np.int32), *(body.surfaces for body in bodies)]),
+    )
+
+
+def camera_values(scene: Scene, shutter: Shutter, anchor: FloatArray) -> FloatArray:
+    """Return the (CAMERA_SIZE,) values of the camera over one exposure."""
+    out = np.zeros(CAMERA_SIZE)
+    first, last, camera = shutter.first, shutter.last, scene.camera
+    out[EYE : EYE + 3] = first.origin - anchor
+    out[EYE_TRAVEL : EYE_TRAVEL + 3] = last.origin - first.origin
+    velocity = np.asarray(camera.velocity)
+    turn = np.zeros(3) if camera.target_velocity is None else np.asarray(camera.target_velocity) - velocity
+    opening, closing = ((shutter.frame + f) / scene.animation.fps for f in (shutter.opening, shutter.closing))
+    out[AXIS : AXIS + 3] = np.asarray(camera.target) - np.asarray(camera.position) + turn * opening
+    out[AXIS_TRAVEL : AXIS_TRAVEL + 3] = turn * (closing - opening)
+    out[UP_HINT : UP_HINT + 3] = camera.up
+    for at, axis in ((RIGHT, first.right), (UP, first.up), (FORWARD, first.forward)):
+        out[at : at + 3] = axis
+    out[SCALE], out[PERSPECTIVE] = first.scale, float(first.perspective)
+    out[CENTER_X], out[CENTER_Y] = first.width / 2, first.height / 2
+    out[TURNING] = float(bool(out[AXIS_TRAVEL : AXIS_TRAVEL + 3].any()))
+    return out
+
+
+def triangle_values(mesh: Mesh) -> FloatArray:
+    """Return (m, TRIANGLE_SIZE): plane and affine texture map of every triangle (zeros for degenerate ones)."""
+    a, b, c = (mesh.vertices[mesh.triangles[:, k]] for k in range(3))
+    uv = [mesh.uv[mesh.triangles[:, k]] for k in range(3)]
+    first, second = b - a, c - a
+    normal = np.cross(first, second)
+    square = np.einsum("ij,ij->i", normal, normal)
+    inverse = np.divide(1.0, square, out=np.zeros_like(square), where=square > 0.0)[:, None]
+    # The dual basis of the two edges: what takes a point of the plane to its two barycentric coordinates.
+    along_first, along_second = np.cross(second, normal) * inverse, np.cross(normal, first) * inverse
+    out = np.zeros((len(mesh.triangles), TRIANGLE_SIZE))
+    out[:, NORMAL : NORMAL + 3] = normal
+    out[:, OFFSET] = np.einsum("ij,ij->i", normal, a)
+    for k, (at, shift) in enumerate(((U_MAP, U_SHIFT), (V_MAP, V_SHIFT))):
+        gradient = (uv[1] - uv[0])[:, k, None] * along_first + (uv[2] - uv[0])[:, k, None] * along_second
+        out[:, at : at + 3] = gradient
+        out[:, shift] = uv[0][:, k] - np.einsum("ij,ij->i", gradient, a)
+    return out
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Looks:
+    """What does not change from frame to frame: the objects' values and all mip levels."""
+
+    objects: FloatArray
+    levels: NDArray[np.int64]
+    texels: NDArray[np.float32]
+    textured: bool
+
+
+def build_looks(scene: Scene, mode: str) -> Looks:
+    """Return the objects' values under a texture mode (`Technique.texture`)."""
+    objects = np.zeros((max(len(scene.objects), 1), OBJECT_SIZE))
+    levels: list[tuple[int, int, int]] = []
+    texels = [np.zeros((1, 4), np.float32)]
+    placed: dict[str, tuple[int, MipChain]] = {}
+    size = 1
+    for values, surface in zip(objects, scene.objects, strict=False):
+        values[COLOR : COLOR + 3] = surface.color
+        values[KIND] = PLAIN
+        if surface.texture is None:
+            continue
+        texture = scene.textures[surface.texture]
+        if not isinstance(texture, ImageTexture) and mode in ("point", "linear"):
+            _put_analytic(values, texture)
+            continue
+        if surface.texture not in placed:
+            chain = mip_chain(texture)
+            placed[surface.texture] = len(levels), chain
+            for level in chain.levels:
+                levels.append((size, level.shape[1], level.shape[0]))
+                texels.append(level.reshape(-1, 4))
+                size += level.shape[0] * level.shape[1]
+        first, chain = placed[surface.texture]
+        values[KIND], values[LEVEL], values[LEVELS] = _CHAIN_KIND[mode], first, len(chain.levels)
+        if mode == "linear":
+            values[KIND], values[LEVELS] = TRILINEAR, 1
+        values[UV_MATRIX : UV_MATRIX + 6] = chain.uv_matrix.ravel()
+    return Looks(
+        objects,
+        np.array(levels, np.int64).reshape(-1, 3),
+        np.concatenate(texels),
+        bool((objects[:, KIND] != PLAIN).any()),
+    )
+
+
+def _put_analytic(values: FloatArray, texture: Texture) -> None:
+    """Write an analytic texture's values into its object's row."""
+    if isinstance(texture, Checker):
+        values[KIND] = CHECKER
+        values[PLACE : PLACE + 2] = texture.squares
+        low, high = texture.black, texture.white
+    elif isinstance(texture, Grating):
+        values[KIND] = SINE if texture.profile == "sine" else SQUARE
+        angle = np.radians(texture.angle_deg)
+        values[PLACE : PLACE + 2] = texture.cycles * np.cos(angle), texture.cycles * np.sin(angle)
+        values[PHASE] = texture.phase
+        low, high = texture.low, texture.high
+    elif isinstance(texture, ImageTexture):
+        raise TypeError("an image is no analytic texture")
+    else:
+        values[KIND] = ZONE
+        values[PLACE : PLACE + 2] = texture.center
+        values[RATE], values[PHASE] = texture.k / (2.0 * np.pi), texture.phase / (2.0 * np.pi)
+        low, high = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
+    values[LOW : LOW + 3] = low
+    values[SPAN : SPAN + 3] = np.subtract(high, low)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Ownership:
+    """Of some triangles in a row: whose they are (m,), and their values (m, TRIANGLE_SIZE), or none without textures."""
+
+    owners: NDArray[np.int32]
+    values: FloatArray
+    counts: tuple[int, ...]
+
+
+def build_ownership(meshes: Sequence[Mesh], *, textured: bool) -> Ownership:
+    """Return what hits on meshes are looked up by, the meshes' triangles one after the other."""
+    rows = [triangle_values(mesh) for mesh in meshes] if textured else []
+    return Ownership(
+        np.concatenate([np.zeros(0, np.int32), *(mesh.owners for mesh in meshes)]),
+        np.concatenate([np.zeros((0, TRIANGLE_SIZE)), *rows]),
+        tuple(len(mesh.triangles) for mesh in meshes),
+    )
+
+
+def build_tables(
+    scene: Scene, looks: Looks, still: Ownership, moving: Ownership, bodies: FloatArray, footprint: float
+) -> Tables:
+    """Return everything that hits are looked up in, for one exposure; `bodies` (b, BODY_SIZE) are those that move."""
+    still_only = not moving.owners.size
+    return Tables(
+        looks.objects,
+        still.owners if still_only else np.concatenate([still.owners, moving.owners]),
+        still.values if still_only else np.concatenate([still.values, moving.values]),
+        bodies,
+        np.cumsum([len(still.owners), *moving.counts], dtype=np.int64),
+        looks.levels,
+        looks.texels,
+        np.asarray(scene.background, dtype=np.float64),
+        footprint,
+    )

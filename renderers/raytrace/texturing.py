@@ -1,0 +1,146 @@
+"""What a texture is worth at a place: analytic ones exactly, images and baked chains from their mip levels.
+
+The formulas of `scenes.textures` and of OpenGL, for 16 lanes at once where all are of one object, or lane by lane.
+"""
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from aliasbench.renderers.raytrace.lanes import LANES, LOD, RED, U, V
+from aliasbench.renderers.raytrace.trig import cos_turns
+from aliasbench.scenes.model import FloatArray
+
+# Values of an object: colour, kind of texture, and what that kind needs.
+COLOR, KIND, PLACE, LOW, SPAN, PHASE, RATE, LEVEL, LEVELS, UV_MATRIX, OBJECT_SIZE = 0, 3, 4, 6, 9, 12, 13, 14, 15, 16, 22
+PLAIN, CHECKER, SINE, SQUARE, ZONE = 0.0, 1.0, 2.0, 3.0, 4.0
+NEAREST, MIPMAP, TRILINEAR = 5.0, 6.0, 7.0
+
+IndexArray = NDArray[np.int64]
+TexelArray = NDArray[np.float32]
+
+
+@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+def _checker_share(values: FloatArray, u: float, v: float) -> float:
+    count = np.floor(u * values[PLACE]) + np.floor(v * values[PLACE + 1])
+    return count - 2.0 * np.floor(count * 0.5)
+
+
+@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+def _sine_share(values: FloatArray, u: float, v: float) -> float:
+    return 0.5 + 0.5 * cos_turns(u * values[PLACE] + v * values[PLACE + 1] + values[PHASE])
+
+
+@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+def _square_share(values: FloatArray, u: float, v: float) -> float:
+    return 0.5 + 0.5 * np.sign(cos_turns(u * values[PLACE] + v * values[PLACE + 1] + values[PHASE]))
+
+
+@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+def _zone_share(values: FloatArray, u: float, v: float) -> float:
+    x, y = u - values[PLACE], v - values[PLACE + 1]
+    return 0.5 + 0.5 * cos_turns((x * x + y * y) * values[RATE] + values[PHASE])
+
+
+@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+def _blend(values: FloatArray, share: float, scratch: FloatArray, i: int) -> None:
+    for k in range(3):
+        scratch[RED + k * LANES + i] = values[COLOR + k] * (values[LOW + k] + share * values[SPAN + k])
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def shade_packet(
+    objects: FloatArray, owner: int, levels: IndexArray, texels: TexelArray, scratch: FloatArray
+) -> None:
+    """Write the colours of 16 hits on one object, from their texture coordinates and levels of detail."""
+    values = objects[owner]
+    kind = values[KIND]
+    if kind == CHECKER:
+        for i in range(LANES):
+            _blend(values, _checker_share(values, scratch[U + i], scratch[V + i]), scratch, i)
+    elif kind == SINE:
+        for i in range(LANES):
+            _blend(values, _sine_share(values, scratch[U + i], scratch[V + i]), scratch, i)
+    elif kind == ZONE:
+        for i in range(LANES):
+            _blend(values, _zone_share(values, scratch[U + i], scratch[V + i]), scratch, i)
+    else:
+        for i in range(LANES):
+            shade_lane(objects, owner, levels, texels, scratch, i)
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def shade_lane(
+    objects: FloatArray, owner: int, levels: IndexArray, texels: TexelArray, scratch: FloatArray, i: int
+) -> None:
+    """Write the colour of one hit, from its texture coordinates and level of detail."""
+    values = objects[owner]
+    kind = values[KIND]
+    u, v = scratch[U + i], scratch[V + i]
+    if kind == CHECKER:
+        _blend(values, _checker_share(values, u, v), scratch, i)
+    elif kind == SINE:
+        _blend(values, _sine_share(values, u, v), scratch, i)
+    elif kind == SQUARE:
+        _blend(values, _square_share(values, u, v), scratch, i)
+    elif kind == ZONE:
+        _blend(values, _zone_share(values, u, v), scratch, i)
+    else:
+        _look_up(values, levels, texels, scratch, i)
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def _look_up(values: FloatArray, levels: IndexArray, texels: TexelArray, scratch: FloatArray, i: int) -> None:
+    """Write the colour of an image (or baked chain) from one level or between two."""
+    kind, first = values[KIND], int(values[LEVEL])
+    u, v = scratch[U + i], scratch[V + i]
+    s = values[UV_MATRIX] * u + values[UV_MATRIX + 1] * v + values[UV_MATRIX + 2]
+    r = values[UV_MATRIX + 3] * u + values[UV_MATRIX + 4] * v + values[UV_MATRIX + 5]
+    if kind == NEAREST:
+        width, height = levels[first, 1], levels[first, 2]
+        at = levels[first, 0] + _wrap(np.floor(r * height), height) * width + _wrap(np.floor(s * width), width)
+        for k in range(3):
+            scratch[RED + k * LANES + i] = values[COLOR + k] * texels[at, k]
+        return
+    lod = min(max(scratch[LOD + i], 0.0), values[LEVELS] - 1.0)
+    if kind == MIPMAP:
+        # GL's rule for the nearest level: ceil(lod + 1/2) - 1.
+        level, part = max(np.ceil(lod + 0.5) - 1.0, 0.0), 0.0
+    else:
+        level = np.floor(lod)
+        part = lod - level
+    at = first + int(level)
+    red, green, blue = _bilinear(levels, texels, at, s, r)
+    if part > 0.0:
+        red_above, green_above, blue_above = _bilinear(levels, texels, at + 1, s, r)
+        red += part * (red_above - red)
+        green += part * (green_above - green)
+        blue += part * (blue_above - blue)
+    scratch[RED + i] = values[COLOR] * red
+    scratch[RED + LANES + i] = values[COLOR + 1] * green
+    scratch[RED + 2 * LANES + i] = values[COLOR + 2] * blue
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def _bilinear(levels: IndexArray, texels: TexelArray, level: int, s: float, r: float) -> tuple[float, float, float]:
+    first, width, height = levels[level, 0], levels[level, 1], levels[level, 2]
+    x, y = s * width - 0.5, r * height - 0.5
+    x0, y0 = np.floor(x), np.floor(y)
+    a, b = x - x0, y - y0
+    left, low = _wrap(x0, width), _wrap(y0, height)
+    right = left + 1 if left + 1 < width else 0
+    high = low + 1 if low + 1 < height else 0
+    p, q = first + low * width, first + high * width
+    w00, w10, w01, w11 = (1.0 - a) * (1.0 - b), a * (1.0 - b), (1.0 - a) * b, a * b
+    return (
+        w00 * texels[p + left, 0] + w10 * texels[p + right, 0] + w01 * texels[q + left, 0] + w11 * texels[q + right, 0],
+        w00 * texels[p + left, 1] + w10 * texels[p + right, 1] + w01 * texels[q + left, 1] + w11 * texels[q + right, 1],
+        w00 * texels[p + left, 2] + w10 * texels[p + right, 2] + w01 * texels[q + left, 2] + w11 * texels[q + right, 2],
+    )
+
+
+@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+def _wrap(index: float, size: int) -> int:
+    """Return a texel index taken into range(size); in float64, which holds every index that means anything."""
+    wrapped = int(index - size * np.floor(index / size))
+    return wrapped if 0 <= wrapped < size else 0

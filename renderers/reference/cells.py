@@ -1,0 +1,91 @@
+"""Small exact pieces of arithmetic for lines inside a cell: doubled precision, crossings and sorting."""
+
+import numpy as np
+from numba import njit
+
+
+@njit(cache=True, nogil=True)
+def _two_difference(a, b):  # type: ignore[no-untyped-def]
+    """Return a - b rounded, and what the rounding lost (Knuth)."""
+    s = a - b
+    t = s - a
+    return s, (a - (s - t)) - (b + t)
+
+
+@njit(cache=True, nogil=True)
+def _two_product(a, b):  # type: ignore[no-untyped-def]
+    """Return a b rounded, and what the rounding lost (Dekker's splitting; fine below 1e150)."""
+    p = a * b
+    t = 134217729.0 * a
+    ah = t - (t - a)
+    al = a - ah
+    t = 134217729.0 * b
+    bh = t - (t - b)
+    bl = b - bh
+    return p, ((ah * bh - p) + ah * bl + al * bh) + al * bl
+
+
+@njit(cache=True, nogil=True)
+def local_line(x0, y0, x1, y1, X, Y):  # type: ignore[no-untyped-def]
+    """Return (c, m) of the line x = c + m y through two points, both relative to the corner (X, Y); y0 < y1.
+
+    c is the cross product of the moved points over the difference of their heights. Both are taken in doubled
+    precision: rounding the moved points alone would cost the digits between the cell's size and its place.
+    """
+    ax, axe = _two_difference(x0, X)
+    ay, aye = _two_difference(y0, Y)
+    bx, bxe = _two_difference(x1, X)
+    by, bye = _two_difference(y1, Y)
+    p, pe = _two_product(ax, by)
+    q, qe = _two_product(bx, ay)
+    cross, lost = _two_difference(p, q)
+    lost += pe - qe + (ax * bye + axe * by) - (bx * aye + bxe * ay)
+    dy, dye = _two_difference(y1, y0)
+    dx, dxe = _two_difference(x1, x0)
+    c = (cross + lost) / dy
+    r, re = _two_product(c, dy)
+    c += (((cross - r) - re) + lost - c * dye) / dy
+    m = dx / dy
+    r, re = _two_product(m, dy)
+    m += (((dx - r) - re) + dxe - m * dye) / dy
+    return c, m
+
+
+@njit(cache=True, nogil=True)
+def cross_lines(line, n, size, events, count):  # type: ignore[no-untyped-def]
+    """Append the heights in (0, size) where lines end, meet the cell's sides or each other; return the new count."""
+    for i in range(n):
+        c, m, low, high = line[i]
+        low, high = max(low, 0.0), min(high, size)
+        for y in (low, high):
+            if 0.0 < y < size:
+                events[count] = y
+                count += 1
+        if m != 0.0:
+            for x in (0.0, size):
+                y = (x - c) / m
+                if low < y < high:
+                    events[count] = y
+                    count += 1
+        for j in range(i):
+            if line[j, 1] != m:
+                y = (line[j, 0] - c) / (m - line[j, 1])
+                if max(low, line[j, 2]) < y < min(high, line[j, 3]):
+                    events[count] = y
+                    count += 1
+    return count
+
+
+@njit(cache=True, nogil=True)
+def sort_prefix(values, n):  # type: ignore[no-untyped-def]
+    """Sort the first n values in place."""
+    if n > 48:
+        values[:n] = np.sort(values[:n])
+        return
+    for i in range(1, n):
+        v = values[i]
+        j = i - 1
+        while j >= 0 and values[j] > v:
+            values[j + 1] = values[j]
+            j -= 1
+        values[j + 1] = v

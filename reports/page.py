@@ -1,0 +1,182 @@
+"""The report: one HTML file that opens offline and shows what each millisecond of antialiasing buys.
+
+Everything is inside the one file (pictures, the chart library, style and script), because a report is mailed, archived
+as a build artifact and opened from a disk. This module gathers; figures, charts and tables decide; the template draws.
+"""
+
+import os
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import jinja2
+from plotly.offline import get_plotlyjs
+
+from aliasbench.reports import charts, tables
+from aliasbench.reports.figures import HEAT_HIGH, HEAT_LOW, heat_palette
+from aliasbench.reports.gallery import Gallery, make_galleries
+from aliasbench.reports.records import Record, Run, load_runs
+from aliasbench.scenes.errors import InputError
+
+MAIN_FACTS = ("cpu", "cores", "memory", "os", "python", "aliasbench", "opengl", "embree")
+
+
+@dataclass(frozen=True, slots=True)
+class Trouble:
+    """Cases of one scene that did not come out for one and the same reason."""
+
+    run: str
+    scene: str
+    status: str
+    reason: str
+    techniques: Sequence[str]
+
+
+@dataclass(frozen=True, slots=True)
+class SceneSection:
+    """One scene at one size: its pictures, its chart (None where nothing can be drawn) and its table."""
+
+    anchor: str
+    title: str
+    size: str
+    gallery: Gallery
+    figure: dict[str, Any] | None
+    findings: Sequence[str]
+    at_floor: Sequence[str]
+    absent: Sequence[str]
+    table: tables.Table
+
+
+def write_report(run_dirs: Sequence[Path], out: Path) -> Path:
+    """Write the report of one or several runs and return the path of its `index.html`.
+
+    Parameters
+    ----------
+    run_dirs : sequence of Path
+        Run directories; records of several are shown together, each with the label of its run.
+    out : Path
+        A directory, created where it is missing. The page replaces an older one only when it is complete.
+
+    Raises
+    ------
+    InputError
+        If a directory holds no run or the page cannot be written.
+    """
+    text = render_page(load_runs(run_dirs))
+    page = Path(out) / "index.html"
+    try:
+        page.parent.mkdir(parents=True, exist_ok=True)
+        handle, name = tempfile.mkstemp(prefix=".writing-", suffix=".html", dir=page.parent)
+        with os.fdopen(handle, "w", encoding="utf-8") as file:
+            file.write(text)
+        Path(name).chmod(0o644)
+        Path(name).replace(page)
+    except OSError as error:
+        raise InputError(f"cannot write the report to {str(out)!r}: {error.strerror or error}") from None
+    return page
+
+
+def render_page(runs: Sequence[Run]) -> str:
+    """Return the whole page as text."""
+    records = [record for run in runs for record in run.records]
+    labels = [run.label for run in runs]
+    scenes = _scene_sections(records, labels)
+    resources = files("aliasbench.reports")
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("aliasbench.reports", "templates"),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=jinja2.StrictUndefined,
+    )
+    return environment.get_template("page.html.j2").render(
+        runs=runs,
+        machines=[_machine_facts(run) for run in runs if run.machine],
+        suites=", ".join(dict.fromkeys(run.suite for run in runs if run.suite)),
+        dates=_dates(runs),
+        counts=tables.status_counts(records),
+        scenes=scenes,
+        troubles=_troubles(records),
+        overview=tables.overview_table(records) if records else None,
+        records=tables.record_table(records, labels),
+        figures=[{"id": s.anchor, **s.figure} for s in scenes if s.figure],
+        heat_colours=["#" + bytes(c).hex() for c in heat_palette()[::5]],
+        heat_ticks=_heat_ticks(),
+        style=(resources / "style.css").read_text(encoding="utf-8"),
+        viewer=(resources / "viewer.js").read_text(encoding="utf-8"),
+        plotly=get_plotlyjs() if any(s.figure for s in scenes) else "",
+    )
+
+
+def _dates(runs: Sequence[Run]) -> str:
+    """Return when the runs were started, as far as they say, and when the page was made."""
+    started = [run.started.replace("T", " ").replace("Z", " UTC") for run in runs if run.started]
+    made = f"page made {datetime.now(UTC):%Y-%m-%d %H:%M} UTC"
+    return f"run {', '.join(dict.fromkeys(started))}; {made}" if started else made
+
+
+def _machine_facts(run: Run) -> dict[str, Any]:
+    """Return the facts that explain timings first, and the rest to be folded away."""
+    main = [(k, v) for k, v in run.machine.items() if v and k.lower() in MAIN_FACTS]
+    rest = [(k, v) for k, v in run.machine.items() if v and (k, v) not in main]
+    return {"label": run.label, "main": main or rest[:8], "rest": rest if main else rest[8:]}
+
+
+def _scene_sections(records: Sequence[Record], runs: Sequence[str]) -> list[SceneSection]:
+    groups: dict[tuple[str, tuple[int, int]], list[Record]] = {}
+    for record in records:
+        groups.setdefault((record.scene, record.size), []).append(record)
+    galleries = make_galleries(list(groups.values()), runs)
+    return [
+        _scene_section(f"scene-{number}", group, gallery, runs)
+        for number, (group, gallery) in enumerate(zip(groups.values(), galleries, strict=True), 1)
+    ]
+
+
+def _scene_section(anchor: str, group: Sequence[Record], gallery: Gallery, runs: Sequence[str]) -> SceneSection:
+    points = charts.chart_points(group)
+    drawn = {id(p.record) for p in points}
+    return SceneSection(
+        anchor=anchor,
+        title=group[0].scene,
+        size="{} × {}".format(*group[0].size),
+        gallery=gallery,
+        figure=charts.speed_chart(points, runs) if points else None,
+        findings=charts.findings(points),
+        at_floor=[charts.describe(p) for p in points if p.reason],
+        absent=[_absence(r) for r in group if id(r) not in drawn],
+        table=tables.scene_table(group, runs),
+    )
+
+
+def _troubles(records: Sequence[Record]) -> list[Trouble]:
+    techniques: dict[tuple[str, str, str, str], list[str]] = {}
+    for record in records:
+        if record.status != "ok":
+            key = (record.run, record.scene, record.status, record.error or "no reason was recorded")
+            techniques.setdefault(key, []).append(record.technique)
+    return [Trouble(*key, names) for key, names in techniques.items()]
+
+
+def _absence(record: Record) -> str:
+    """Return why a record is not on the chart."""
+    if record.status != "ok":
+        reason = record.status
+    elif record.timing is None:
+        reason = "not timed"
+    else:
+        score = record.metrics.get("rmse")
+        reason = f"RMSE {score.status.replace('_', ' ')}" if score else "RMSE not measured"
+    return f"{record.technique} ({reason})"
+
+
+def _heat_ticks() -> list[str]:
+    ticks, value = [], HEAT_LOW
+    while value <= HEAT_HIGH * 1.001:
+        ticks.append(f"{value:g}")
+        value *= 10
+    return ticks

@@ -1,0 +1,165 @@
+"""Scenes from what a user writes: a catalog name, a name with parameters, or a TOML scene file (schema 1).
+
+A file is read strictly (see `schema`): whatever is wrong is one sentence with the file, the key's path, the value and
+what is allowed, before any renderer sees it.
+"""
+
+import math
+import re
+import tomllib
+from pathlib import Path
+
+import numpy as np
+
+from aliasbench.scenes.catalog import SCENES, build_scene
+from aliasbench.scenes.errors import InputError, NotAvailableError, unknown_name
+from aliasbench.scenes.facts import read_facts
+from aliasbench.scenes.file_objects import read_light, read_object, read_textures
+from aliasbench.scenes.model import Animation, Camera, Scene
+from aliasbench.scenes.projection import view_at
+from aliasbench.scenes.schema import Table
+
+SCHEMA = 1
+MODEL_SUFFIXES = (".glb", ".gltf", ".obj", ".ply")
+_ROOT = ("schema", "name", "background", "contrast", "animation", "camera", "object", "texture", "light", "fact")
+_CAMERA = (
+    *("projection", "position", "target", "up", "height", "fov_y_deg"),
+    *("velocity", "target_velocity", "lens_radius", "focus_distance"),
+)
+
+
+def load_scene(text: str) -> Scene:
+    """Return the scene that a text names.
+
+    Parameters
+    ----------
+    text : str
+        The path of a scene file (anything that exists as a file, ends in ``.toml`` or has a path separator); otherwise
+        a name in `catalog.SCENES`, with parameters or without: ``propeller:blades=5,rev_per_s=23.5``.
+
+    Raises
+    ------
+    InputError
+        If there is no such scene, or the file or a parameter is wrong.
+    NotAvailableError
+        For meshes, which this version does not read.
+    """
+    given = text.strip()
+    path = Path(given)
+    if path.suffix.lower() in MODEL_SUFFIXES:
+        raise NotAvailableError(
+            f"scene {given!r}: this version reads no model files; scene files (.toml) with polygons and quads it does"
+        )
+    if given and (path.suffix.lower() == ".toml" or "/" in given or "\\" in given or _is_file(path)):
+        return read_scene_file(path)
+    name = given.partition(":")[0].strip()
+    if name not in SCENES:
+        problem = unknown_name("scene", name, SCENES)
+        raise InputError(f"{problem}; or the path of a scene file (.toml)")
+    return build_scene(given)
+
+
+def read_scene_file(path: Path) -> Scene:
+    """Return the scene of a TOML file (schema 1); see `load_scene`."""
+    file = str(path)
+    root = Table(file, "", _parse(path))
+    # First: a newer file may well have keys that this version does not know.
+    schema = root.whole("schema", SCHEMA, at_least=0)
+    if schema != SCHEMA:
+        root.refuse("schema", f"{SCHEMA}, the only version of scene files that this version reads")
+    root.check_keys(_ROOT)
+    animation = _read_animation(root.table("animation"))
+    camera = _read_camera(root.table("camera"), animation)
+    textures = read_textures(root.table("texture"), path.parent)
+    objects = tuple(read_object(t, textures) for t in root.tables("object"))
+    return Scene(
+        name=root.text("name", path.stem),
+        camera=camera,
+        objects=objects,
+        textures=textures,
+        lights=tuple(read_light(t) for t in root.tables("light")),
+        background=root.color("background", (0.0, 0.0, 0.0)),
+        contrast=root.number("contrast", 1.0, above=0.0),
+        animation=animation,
+        facts=read_facts(root.table("fact"), objects, camera),
+    )
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except OSError:
+        return False  # a text too long to be a path, say
+
+
+def _parse(path: Path) -> dict[str, object]:
+    file = str(path)
+    try:
+        text = path.read_bytes().decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise InputError(f"{file}: byte {error.start} is not UTF-8; a scene file is a TOML text in UTF-8") from error
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InputError(f"{file}: cannot be read ({reason}); the path of a scene file (.toml) is needed") from error
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        said = re.fullmatch(r"(.*) \(at line (\d+), column (\d+)\)", str(error), re.DOTALL)
+        if said is not None:
+            what, line, column = said[1], int(said[2]), int(said[3])
+        else:
+            # Only the end of the document is reported without a place.
+            what = str(error).removesuffix(" (at end of document)")
+            line, column = text.count("\n") + 1, len(text) - (text.rfind("\n") + 1) + 1
+        raise InputError(f"{file}: line {line}, column {column}: not valid TOML: {what}") from error
+    except RecursionError as error:
+        raise InputError(f"{file}: nested too deeply to be a scene file") from error
+
+
+def _read_animation(table: Table) -> Animation:
+    table.check_keys(("fps", "frames", "shutter"))
+    return Animation(
+        fps=table.number("fps", 30.0, above=0.0),
+        frames=table.whole("frames", 1, at_least=1),
+        shutter=table.number("shutter", 0.0, at_least=0.0, at_most=1.0),
+    )
+
+
+def _read_camera(table: Table, animation: Animation) -> Camera:
+    table.check_keys(_CAMERA)
+    flat = table.choice("projection", ("orthographic", "perspective"), "orthographic") == "orthographic"
+    for key, wanted in (("fov_y_deg", "perspective"), ("height", "orthographic")):
+        if table.has(key) and flat != (wanted == "orthographic"):
+            table.refuse(key, f'left out: it belongs to projection = "{wanted}"')
+    camera = Camera(
+        projection="orthographic" if flat else "perspective",
+        position=table.vector("position", (0.0, 0.0, 5.0)),
+        target=table.vector("target", (0.0, 0.0, 0.0)),
+        up=table.direction("up", (0.0, 1.0, 0.0)),
+        height=table.number("height", 2.0, above=0.0) if flat else None,
+        fov_y_deg=None if flat else table.number("fov_y_deg", above=0.0, below=180.0),
+        velocity=table.vector("velocity", (0.0, 0.0, 0.0)),
+        target_velocity=table.vector("target_velocity") if table.has("target_velocity") else None,
+        lens_radius=table.number("lens_radius", 0.0, at_least=0.0),
+        focus_distance=table.number("focus_distance", above=0.0) if table.has("focus_distance") else None,
+    )
+    for t in _critical_times(camera, animation):
+        try:
+            view_at(camera, animation, 0, t * animation.fps, (2, 2))
+        except InputError as error:
+            raise InputError(f"{table.file}: {error}") from error
+    return camera
+
+
+def _critical_times(camera: Camera, animation: Animation) -> list[float]:
+    """Return the times of the animation at which the camera can be degenerate: its ends, and where it comes nearest."""
+    end = (animation.frames - 1 + animation.shutter) / animation.fps
+    axis = np.array(camera.target) - np.array(camera.position)
+    drift = np.array(camera.target_velocity or camera.velocity) - np.array(camera.velocity)
+    up = np.array(camera.up) / math.hypot(*camera.up)
+    times = [0.0, end]
+    # |p + q t| is least at t = -p.q / q.q; p, q first the axis itself, then its part across `up`.
+    for p, q in ((axis, drift), (np.cross(axis, up), np.cross(drift, up))):
+        if (q_squared := float(q @ q)) > 0.0:
+            times.append(min(max(0.0, -float(p @ q) / q_squared), end))
+    return times

@@ -1,0 +1,48 @@
+"""A propeller before a camera of 30 frames a second: strobing, the wagon wheel.
+
+At 1 rev/s a blade moves 12 degrees a frame and is seen to; at 30 rev/s every frame is the same picture; at 29 rev/s the
+blades creep backwards. Look at the direction in which they seem to turn, and with an open shutter at how blur takes the
+false motion away.
+
+Blades are sectors with radial edges only, from inside the annulus that the metrics look at to outside of it (their
+outer arcs are polylines within 1/500 of the radius, their inner ends straight): in the annulus a blade is the same
+share of the circle at every radius, for which the strobing metrics have closed forms. The rotor is declared. The frames
+are a whole number of turns wherever the rate allows it within ten seconds.
+"""
+
+import math
+
+from aliasbench.scenes.errors import InputError
+from aliasbench.scenes.model import Animation, Facts, Motion, RotorFact, Scene, Spin
+from aliasbench.scenes.shapes import polygon
+from aliasbench.scenes.staging import FPS, flat_camera, loop_frames, polar
+
+START_ANGLE = 0.2  # radians: no edge starts along a row or a column
+CHORD_ERROR = 1 / 500  # of the outer radius, which the arc's chords may come inside it
+HUB_SHARE, TIP_SHARE = 0.5, 1.08  # of the annulus' inner and outer radius: where blades begin and end
+
+
+def build_propeller(
+    *, name: str, blades: int, rev_per_s: float, duty: float, shutter: float, inner: float, outer: float
+) -> Scene:
+    """Return white blades on black that turn about the picture's middle; see the catalog for the parameters."""
+    if inner >= outer:
+        raise InputError(f"scene 'propeller': parameter inner = {inner:g}: must be less than outer, {outer:g}")
+    axis, center = (0.0, 0.0, 1.0), (0.0, 0.0, 0.0)
+    motion = Motion(spin=Spin(axis, center, rev_per_s))
+    width = 2 * math.pi * duty / blades
+    steps = math.ceil(width / (2 * math.acos(1 - CHORD_ERROR)))
+    hub, tip = HUB_SHARE * inner, TIP_SHARE * outer
+    objects = []
+    for k in range(blades):
+        first = START_ANGLE + 2 * math.pi * k / blades
+        arc = [polar(tip, first + width * i / steps) for i in range(steps + 1)]
+        ends = [polar(hub, first + width), polar(hub, first)]
+        objects.append(polygon([*arc, *ends], motion=motion, name=f"blade {k}"))
+    return Scene(
+        name=name,
+        camera=flat_camera(),
+        objects=tuple(objects),
+        animation=Animation(fps=float(FPS), frames=loop_frames(rev_per_s), shutter=shutter),
+        facts=Facts(rotors=(RotorFact(center, axis, blades, duty, rev_per_s, inner, outer),)),
+    )

@@ -1,0 +1,131 @@
+"""The contract of a prepared scene: determinism, counts and times, what is refused, and that nothing stays behind."""
+
+import gc
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from aliasbench.renderers.catalog import prepare, render
+from aliasbench.renderers.raster.context import acquire_context
+from aliasbench.scenes.errors import InputError, NotAvailableError
+from aliasbench.scenes.model import Light, Material
+
+pytestmark = pytest.mark.usefixtures("gl_checked")
+SIZE = (32, 24)
+
+
+@pytest.mark.parametrize("technique", ["raster", "raster:msaa=4", "raster:passes=5", "raster:passes=3,msaa=4"])
+def test_same_arguments_give_the_same_pixels(make, technique):
+    scene = make.star(animation=make.moving)
+    with prepare(scene, technique, size=SIZE) as prepared:
+        first = prepared.render(frame=1, seed=2)
+        prepared.render(frame=2, seed=3)
+        again = prepared.render(frame=1, seed=2)
+    np.testing.assert_array_equal(first.pixels, again.pixels)
+    np.testing.assert_array_equal(first.pixels, render(scene, technique, size=SIZE, frame=1, seed=2).pixels)
+
+
+def test_seeds_change_jittered_passes_only(make):
+    scene = make.star()
+    for technique, changes in (("raster:passes=4", True), ("raster:passes=4,sampler=grid", False), ("raster", False)):
+        with prepare(scene, technique, size=SIZE) as prepared:
+            one, other = (prepared.render(seed=s).pixels for s in (0, 1))
+        assert (one != other).any() == changes
+
+
+def test_frames_say_what_they_are(make):
+    with prepare(make.star(), "raster:msaa=4,passes=3", size=SIZE) as prepared:
+        frames = [prepared.render() for _ in range(2)]
+    for frame in frames:
+        assert frame.pixels.shape == (24, 32, 3)
+        assert frame.pixels.dtype == np.float32
+        assert frame.samples == 32 * 24 * 12
+        assert 0 < frame.seconds < 60
+        assert frame.setup_seconds == frames[0].setup_seconds > 0
+        assert frame.sample_counts is None
+        assert frame.uncertainty is None
+    # a later frame must not write into an earlier one
+    assert not np.shares_memory(frames[0].pixels, frames[1].pixels)
+
+
+def test_a_closed_scene_refuses_to_draw(make):
+    with prepare(make.star(), "raster", size=SIZE) as prepared:
+        pass
+    with pytest.raises(RuntimeError, match="this prepared scene is closed"):
+        prepared.render()
+
+
+def test_forgotten_scenes_are_freed_by_the_next(make):
+    context = acquire_context()
+    prepare(make.star(), "raster:msaa=4", size=SIZE)
+    gc.collect()
+    assert len(context._left_over) == 2
+    with prepare(make.star(), "raster", size=SIZE):
+        assert not context._left_over
+
+
+@pytest.mark.parametrize(
+    ("technique", "feature"),
+    [
+        ("raster:filter=gaussian", "filter=gaussian"),
+        ("raster:radius=1", "filter=box,radius=1"),
+        ("raster:passes=4,weighting=distribution", "weighting=distribution"),
+        ("raster:texture=anisotropic", "texture=anisotropic"),
+        ("raster:post=fxaa", "post=fxaa"),
+        ("raster:msaa=4,alpha_to_coverage=on", "alpha_to_coverage=on"),
+        ("raster:motion=matrix", "motion=matrix"),
+        ("raster:passes=4,sampler=sobol", "sampler=sobol"),
+    ],
+)
+def test_features_that_are_not_there_yet_say_what_is(make, technique, feature):
+    with pytest.raises(NotAvailableError, match=f"{feature} is not available yet; available: "):
+        prepare(make.star(), technique, size=SIZE)
+
+
+def test_materials_lights_and_lenses_say_that_they_are_not_there_yet(make):
+    star = make.star()
+    light = Light(((0, 0, 2), (1, 0, 2), (1, 1, 2), (0, 1, 2)), (1.0, 1.0, 1.0))
+    diffuse = tuple(replace(s, material=Material("diffuse")) for s in star.objects)
+    glass = tuple(replace(s, material=Material("glass")) for s in star.objects)
+    lens = replace(star.camera, lens_radius=0.1)
+    for scene, feature in (
+        (replace(star, lights=(light,)), "a visible light"),
+        (replace(star, lights=(light,), objects=diffuse), "diffuse material under a light"),
+        (replace(star, objects=glass), "material 'glass'"),
+        (replace(star, camera=lens), r"a lens \(lens_radius = 0.1\)"),
+    ):
+        with pytest.raises(NotAvailableError, match=f"raster: {feature} is not available yet; available: "):
+            prepare(scene, "raster", size=SIZE)
+
+
+def test_diffuse_without_lights_is_unlit(make):
+    star = make.star()
+    diffuse = replace(star, objects=tuple(replace(s, material=Material("diffuse")) for s in star.objects))
+    np.testing.assert_array_equal(render(diffuse, "raster", size=SIZE).pixels, render(star, "raster", size=SIZE).pixels)
+
+
+def test_hardware_samples_that_are_lacking_are_refused(make):
+    counts = acquire_context().sample_counts
+    with pytest.raises(InputError, match=f"msaa=3: this device .* has {', '.join(map(str, counts))} samples a pixel"):
+        prepare(make.star(), "raster:msaa=3", size=SIZE)
+
+
+def test_pictures_beyond_the_devices_limit_are_refused(make):
+    limit = min(acquire_context().max_size, acquire_context().max_texture_size)
+    with pytest.raises(InputError, match=f"size {limit + 1}x2: this device .* draws at most {limit}"):
+        prepare(make.star(), "raster", size=(limit + 1, 2))
+
+
+def test_supersampled_pictures_beyond_the_devices_limit_are_refused(make):
+    context = acquire_context()
+    limit = min(context.max_size, context.max_texture_size)
+    for text in ("ssaa=4", "ssaa=4,passes=2,msaa=4"):
+        with pytest.raises(InputError, match=f"size {limit // 4 + 1}x2 with ssaa=4: this device .* draws at most"):
+            prepare(make.star(), f"raster:{text}", size=(limit // 4 + 1, 2))
+
+
+def test_a_picture_of_one_pixel(make):
+    whole = make.polygon([[-2, -2, 0], [2, -2, 0], [2, 2, 0], [-2, 2, 0]], color=(0.5, 0.25, 2.0))
+    for technique in ("raster", "raster:msaa=4", "raster:msaa=4,passes=2", "raster:ssaa=5"):
+        np.testing.assert_array_equal(render(make.scene(whole), technique, size=(1, 1)).pixels[0, 0], (0.5, 0.25, 2.0))

@@ -1,0 +1,127 @@
+"""Textured references: closed forms within the stated bound, and both truths of a texture."""
+
+import numpy as np
+import pytest
+
+from aliasbench.renderers.catalog import render
+from aliasbench.scenes.errors import NotAvailableError
+from aliasbench.scenes.model import Camera, Checker, Grating, ImageTexture, Motion, ZonePlate, read_only
+from aliasbench.scenes.textures import evaluate_point
+
+SQUARE = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
+
+
+def dark_minus_light(edges):
+    """Return the means of (-1)^floor between neighbouring edges."""
+    whole = np.floor(edges)
+    rest = edges - whole
+    return np.diff(np.where(np.mod(whole, 2) == 0, rest, 1 - rest)) / np.diff(edges)
+
+
+def test_fronto_parallel_checker_is_exact(make_polygon, make_scene):
+    scene = make_scene([make_polygon(SQUARE, texture="c")], textures={"c": Checker((5.3, 7.1))})
+    frame = render(scene, "reference:", size=(20, 20))
+    u = dark_minus_light(np.linspace(0, 5.3, 21))
+    v = dark_minus_light(np.linspace(7.1, 0, 21))
+    expected = 0.5 - 0.5 * v[:, None] * u[None, :]
+    assert frame.uncertainty_kind == "confidence"
+    assert frame.samples > 0
+    assert np.abs(frame.pixels[..., 0] - expected).max() < 1e-11
+
+
+@pytest.mark.parametrize("texture", ["point", "linear"])
+def test_image_truth_is_squares_or_their_blend(make_polygon, make_scene, texture):
+    texels = np.random.default_rng(5).random((3, 4, 4)).astype(np.float32)
+    scene = make_scene([make_polygon(SQUARE, texture="i")], textures={"i": ImageTexture(read_only(texels))})
+    size = (12, 12)
+    frame = render(scene, f"reference:texture={texture}", size=size)
+    # 12 pixels over 4 and 3 texels: midpoints of a fine grid integrate squares exactly, blends to 1 / k^2
+    k = 40
+    u = (np.arange(12 * k) + 0.5) / (12 * k)
+    v = 1 - u
+    column, row = u * 4, v * 3
+    if texture == "point":
+        values = texels[np.floor(row).astype(int)[:, None], np.floor(column).astype(int)[None, :], :3].astype(float)
+    else:
+        i, j = np.floor(column - 0.5), np.floor(row - 0.5)
+        s, t = (column - 0.5 - i)[None, :, None], (row - 0.5 - j)[:, None, None]
+        pick = lambda dj, di: texels[np.mod(j + dj, 3).astype(int)[:, None], np.mod(i + di, 4).astype(int)[None, :], :3]  # noqa: E731
+        values = (1 - t) * ((1 - s) * pick(0, 0) + s * pick(0, 1)) + t * ((1 - s) * pick(1, 0) + s * pick(1, 1))
+    expected = values.reshape(12, k, 12, k, 3).mean(axis=(1, 3))
+    assert frame.uncertainty is not None
+    assert np.abs(frame.pixels - expected).max() <= frame.uncertainty + (1e-9 if texture == "point" else 1e-4)
+
+
+def test_rolled_perspective_checker_is_within_its_bound(make_polygon, make_scene):
+    camera = Camera("perspective", position=(0.2, 0.9, 2.0), target=(0, 0, 0), up=(0.3, 1, 0), fov_y_deg=40.0)
+    floor = [(-1.0, 0.0, 1.0), (1.0, 0.0, 1.0), (1.0, 0.0, -1.0), (-1.0, 0.0, -1.0)]
+    texture = Checker((6.0, 6.0), (0.1, 0.0, 0.0), (0.9, 0.8, 1.0))
+    scene = make_scene(
+        [make_polygon(floor, (0.5, 1, 1), texture="c")], camera=camera, textures={"c": texture}, background=(0.2, 0.2, 0.2)
+    )
+    size = (16, 12)
+    frame = render(scene, "reference:", size=size)
+    from aliasbench.scenes.projection import view_at
+
+    k = 64
+    x, y = np.meshgrid((np.arange(16 * k) + 0.5) / k, (np.arange(12 * k) + 0.5) / k)
+    origin, direction = view_at(camera, scene.animation, 0, 0.0, size).ray(x, y)
+    t = -origin[..., 1] / direction[..., 1]
+    hit = origin + t[..., None] * direction
+    inside = (np.abs(hit[..., 0]) <= 1) & (np.abs(hit[..., 2]) <= 1) & (t > 0)
+    uv = np.stack([(hit[..., 0] + 1) / 2, (1 - hit[..., 2]) / 2], axis=-1)
+    shown = np.where(inside[..., None], evaluate_point(texture, uv)[..., :3] * (0.5, 1, 1), 0.2)
+    expected = shown.reshape(12, k, 16, k, 3).mean(axis=(1, 3))
+    assert frame.uncertainty is not None and frame.uncertainty < 5e-3
+    # the regular grid itself: a few edges in a pixel, each off by at most half a cell's share
+    assert np.abs(frame.pixels - expected).max() <= frame.uncertainty + 3 * 0.5 / k
+    assert np.sqrt(((frame.pixels - expected) ** 2).mean()) < 2e-3
+
+
+@pytest.mark.parametrize("profile", ["sine", "square"])
+def test_grating_has_the_box_filter_of_its_wave(make_polygon, make_scene, profile):
+    grating = Grating(3.0, 90.0, 0.1, profile, (0.2, 0.2, 0.2), (0.8, 0.7, 0.6))
+    scene = make_scene([make_polygon(SQUARE, texture="g")], textures={"g": grating})
+    frame = render(scene, "reference:", size=(8, 16))
+    v = np.linspace(1, 0, 17)
+    if profile == "sine":
+        mean = 0.5 + 0.5 * np.diff(np.sin(2 * np.pi * (3 * v + 0.1))) / np.diff(6 * np.pi * v)
+    else:
+        mean = 0.5 + 0.5 * dark_minus_light(2 * (3 * v + 0.1) + 0.5)
+    expected = np.array([0.2, 0.2, 0.2]) + mean[:, None] * np.array([0.6, 0.5, 0.4])
+    assert frame.uncertainty is not None and frame.uncertainty < 1e-3
+    assert np.abs(frame.pixels - expected[:, None]).max() <= frame.uncertainty
+
+
+def test_zone_plate_is_within_its_bound(make_polygon, make_scene):
+    from scipy.special import fresnel
+
+    k = 200.0
+    scene = make_scene([make_polygon(SQUARE, texture="z")], textures={"z": ZonePlate((0.5, 0.5), k, 0.3)})
+    frame = render(scene, "reference:", size=(16, 16))
+    x = np.linspace(-0.5, 0.5, 17)
+    scale = np.sqrt(2 * k / np.pi)
+    s, c = fresnel(x * scale)
+    along = np.diff(c + 1j * s) / scale * 16
+    expected = 0.5 + 0.5 * (np.exp(0.3j) * along[:, None] * along[None, :]).real
+    assert frame.uncertainty is not None and frame.uncertainty < 5e-3
+    assert np.abs(frame.pixels[..., 1] - expected).max() <= frame.uncertainty
+
+
+def test_panned_checker_blurs_as_its_motion_says(make_polygon, make_scene):
+    # two squares to a period of 4 pixels, moved by exactly one period: an even grey
+    wide = [(-9.0, -3.0), (9.0, -3.0), (9.0, 3.0), (-9.0, 3.0)]
+    px = 2.0 / 16
+    checker = Checker((18.0 / (2 * px), 1.0))
+    pan = Motion((4 * px * 30, 0.0, 0.0))
+    scene = make_scene([make_polygon(wide, texture="c", motion=pan)], textures={"c": checker}, shutter=1.0)
+    frame = render(scene, "reference:", size=(16, 16))
+    assert frame.uncertainty is not None and frame.uncertainty < 0.2
+    assert np.abs(frame.pixels - 0.5).max() <= frame.uncertainty
+
+
+def test_holes_by_alpha_are_refused(make_polygon, make_scene):
+    texels = np.zeros((2, 2, 4), np.float32)
+    scene = make_scene([make_polygon(SQUARE, texture="i")], textures={"i": ImageTexture(read_only(texels), 0.5)})
+    with pytest.raises(NotAvailableError, match="texture 'i' cuts out parts by alpha_cutoff"):
+        render(scene, "reference:", size=(4, 4))

@@ -1,0 +1,298 @@
+"""Every way in which a scene file can be wrong is refused in one sentence: file, key, value and what is allowed."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from aliasbench.scenes.errors import InputError
+from aliasbench.scenes.files import load_scene
+
+Write = Callable[[str], str]
+
+IDENTITY = tuple(np.eye(4).ravel().tolist())
+ROLLING = "[animation]\nfps = 1\nframes = 9\n[camera]\n"
+OBJECT = "[[object]]\nquad = [[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]\n"
+EDGE = "[[fact.edge]]\nfrom = [-1, 1, 0]\n"
+ROTOR = (
+    OBJECT + "spin = { axis = [0, 0, 1], rev_per_s = 2 }\n"
+    "[fact.rotor]\nblades = 3\nduty = 0.5\nrev_per_s = 2\ninner = 0.2\nouter = 0.8\n"
+)
+PAN = OBJECT + "velocity = [1, 0, 0]\n[fact.pan]\n"
+# A scene file with one thing wrong, and what the refusal says of it.
+REFUSED = {
+    "newer schema": ("schema = 2\nfuture = 1", "schema = 2: must be 1, the only version"),
+    "schema is no number": ("schema = true", "schema = true: must be a whole number, 0 or more"),
+    "unknown root key": ("backgroud = [0, 0, 0]", "backgroud = [0, 0, 0]: unknown key 'backgroud'; did you mean 'back"),
+    "name is no text": ("name = 3", "name = 3: must be a text that is not empty"),
+    "name is empty": ('name = ""', 'name = "": must be a text that is not empty'),
+    "background too short": ("background = [0, 0]", "background = [0, 0]: must be a list of 3 finite numbers"),
+    "background holds a bool": ("background = [0, true, 0]", "background = [0, true, 0]: must be a list of 3 finite"),
+    "background not finite": ("background = [0, nan, 0]", "background = [0, NaN, 0]: must be a list of 3 finite"),
+    "background negative": ("background = [0, -1, 0]", "background = [0, -1, 0]: must be linear RGB"),
+    "contrast zero": ("contrast = 0", "contrast = 0: must be a finite number over 0"),
+    "contrast infinite": ("contrast = inf", "contrast = Infinity: must be a finite number over 0"),
+    "contrast beyond float64": ("contrast = 1" + "0" * 400, "contrast = 1000"),
+    "contrast a text": ('contrast = "1"', 'contrast = "1": must be a finite number over 0'),
+    "animation no table": ("animation = 3", "animation = 3: must be a table"),
+    "unknown animation key": (
+        "[animation]\nframe = 3",
+        "animation.frame = 3: unknown key 'frame'; did you mean 'frames'",
+    ),
+    "fps zero": ("[animation]\nfps = 0", "animation.fps = 0: must be a finite number over 0"),
+    "frames zero": ("[animation]\nframes = 0", "animation.frames = 0: must be a whole number, 1 or more"),
+    "frames real": ("[animation]\nframes = 2.0", "animation.frames = 2.0: must be a whole number, 1 or more"),
+    "shutter negative": (
+        "[animation]\nshutter = -0.1",
+        "animation.shutter = -0.1: must be a finite number at least 0 and",
+    ),
+    "shutter over one": (
+        "[animation]\nshutter = 1.5",
+        "animation.shutter = 1.5: must be a finite number at least 0 and at",
+    ),
+    "unknown camera key": ("[camera]\nfov = 30", "camera.fov = 30: unknown key 'fov'"),
+    "unknown projection": (
+        '[camera]\nprojection = "ortographic"',
+        "unknown projection 'ortographic'; did you mean 'ortho",
+    ),
+    "height zero": ("[camera]\nheight = 0", "camera.height = 0: must be a finite number over 0"),
+    "no fov": (
+        '[camera]\nprojection = "perspective"',
+        "camera.fov_y_deg is missing; it must be a finite number over 0 and",
+    ),
+    "fov too wide": (
+        '[camera]\nprojection = "perspective"\nfov_y_deg = 180',
+        "camera.fov_y_deg = 180: must be a finite number over 0 and under 180",
+    ),
+    "fov of an orthographic": (
+        "[camera]\nfov_y_deg = 30",
+        "camera.fov_y_deg = 30: must be left out: it belongs to proj",
+    ),
+    "height of a perspective": (
+        '[camera]\nprojection = "perspective"\nfov_y_deg = 30\nheight = 2',
+        'camera.height = 2: must be left out: it belongs to projection = "orthographic"',
+    ),
+    "camera at its target": ("[camera]\nposition = [0, 0, 0]", "camera: position equals target at t = 0 s"),
+    "camera reaches its target": (
+        ROLLING + "velocity = [0, 0, -1]\ntarget_velocity = [0, 0, 0]",
+        "camera: position equals target at t = 5 s",
+    ),
+    "up along the axis": ("[camera]\nup = [0, 0, 2]", "camera: up [0.0, 0.0, 2.0] is along the viewing axis"),
+    "up comes along the axis": (
+        ROLLING + "position = [4, 3, 0]\nvelocity = [-1, 0, 0]\ntarget_velocity = [0, 0, 0]",
+        "camera: up [0.0, 1.0, 0.0] is along the viewing axis",
+    ),
+    "no up": ("[camera]\nup = [0, 0, 0]", "camera.up = [0, 0, 0]: must be a direction"),
+    "lens negative": ("[camera]\nlens_radius = -1", "camera.lens_radius = -1: must be a finite number at least 0"),
+    "focus zero": ("[camera]\nfocus_distance = 0", "camera.focus_distance = 0: must be a finite number over 0"),
+    "object no array": ("object = 3", "object = 3: must be an array of tables, each under [[object]]"),
+    "object a table": ("[object]\nquad = 3", "must be an array of tables, each under [[object]]"),
+    "no shape": (
+        "[[object]]\ncolor = [1, 1, 1]",
+        "object[0] has none of them; an object needs exactly one of polygon, ",
+    ),
+    "two shapes": (
+        OBJECT + "polygon = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]",
+        "object[0] has polygon and quad together; an object needs exactly one of polygon, quad, mesh",
+    ),
+    "unknown object key": (
+        OBJECT + "colour = [1, 1, 1]",
+        "object[0].colour = [1, 1, 1]: unknown key 'colour'; did you mean 'c",
+    ),
+    "second object": (OBJECT * 2 + "color = 1", "object[1].color = 1: must be a list of 3 finite numbers"),
+    "quad of three": ("[[object]]\nquad = [[0, 0, 0], [1, 0, 0], [1, 1, 0]]", "must be a list of 4 points of 3 finite"),
+    "flat point": (
+        "[[object]]\npolygon = [[0, 0], [1, 0], [0, 1]]",
+        "object[0].polygon = [[0, 0], [1, 0], [0, 1]]: must",
+    ),
+    "point of texts": (
+        '[[object]]\npolygon = ["a"]',
+        'object[0].polygon = ["a"]: must be a list of points of 3 finite',
+    ),
+    "no points": (
+        "[[object]]\npolygon = []",
+        "object[0].polygon = []: must be a list of points of 3 finite numbers each",
+    ),
+    "two points": (
+        "[[object]]\npolygon = [[0, 0, 0], [1, 0, 0]]",
+        "object[0].polygon: has 2 points; at least 3 are needed",
+    ),
+    "not planar": (
+        "[[object]]\nquad = [[0, 0, 0], [1, 0, 0], [1, 1, 0.5], [0, 1, 0]]",
+        "of the polygon's size off its plane; at most 1e-06 is allowed",
+    ),
+    "crossing": (
+        "[[object]]\nquad = [[0, 0, 0], [3, 0, 0], [3, 3, 0], [1, -1, 0]]",
+        "object[0].quad: its outline crosses or touches itself",
+    ),
+    "texture unknown": (
+        OBJECT + 'texture = "brick"\n[texture.bricks]\nchecker = { squares = [1, 1] }',
+        "object[0].texture: unk",
+    ),
+    "texture without uv": (
+        '[[object]]\npolygon = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]\ntexture = "a"\n[texture.a]\nzone_plate = { k = 1 }',
+        "object[0].uv is missing; it must be given with a texture: 3 points of 2 numbers each",
+    ),
+    "uv too short": (
+        OBJECT + "uv = [[0, 0], [1, 0], [1, 1]]",
+        "object[0].uv = [[0, 0], [1, 0], [1, 1]]: must be a list of 4",
+    ),
+    "material unknown": (
+        OBJECT + 'material = "glas"',
+        "object[0].material = \"glas\": unknown material 'glas'; did you mean 'gl",
+    ),
+    "roughness of the unlit": (
+        OBJECT + "roughness = 0.1",
+        "object[0].roughness = 0.1: must be left out: it belongs to mat",
+    ),
+    "roughness too large": (
+        OBJECT + 'material = "glossy"\nroughness = 1.5',
+        "object[0].roughness = 1.5: must be a finite number over 0 and at most 1",
+    ),
+    "ior zero": (OBJECT + 'material = "glass"\nior = 0', "object[0].ior = 0: must be a finite number over 0"),
+    "spin no table": (OBJECT + "spin = 3", "object[0].spin = 3: must be a table"),
+    "spin without rate": (
+        OBJECT + "spin = { axis = [0, 0, 1] }",
+        "object[0].spin.rev_per_s is missing; it must be a finite",
+    ),
+    "spin about nothing": (
+        OBJECT + "spin = { axis = [0, 0, 0], rev_per_s = 1 }",
+        "object[0].spin.axis = [0, 0, 0]: must be a direction: three finite numbers, not all zero",
+    ),
+    "spin key unknown": (
+        OBJECT + "spin = { rev_per_sec = 1 }",
+        "object[0].spin.rev_per_sec = 1: unknown key 'rev_per_sec'; did y",
+    ),
+    "matrices with velocity": (
+        OBJECT + f"velocity = [0, 0, 0]\nmatrices = [{list(IDENTITY)}, {list(IDENTITY)}]",
+        "object[0].velocity = [0, 0, 0]: must be left out: matrices say the whole motion",
+    ),
+    "matrices with spin": (
+        OBJECT + f"spin = {{ rev_per_s = 1 }}\nmatrices = [{list(IDENTITY)}, {list(IDENTITY)}]",
+        'object[0].spin = {"rev_per_s": 1}: must be left out: matrices say the whole motion',
+    ),
+    "one matrix": (OBJECT + f"matrices = [{list(IDENTITY)}]", "must be a list of 2 points of 16 finite numbers each"),
+    "matrix not affine": (
+        OBJECT + f"matrices = [{list(IDENTITY)}, {[*IDENTITY[:15], 2.0]}]",
+        "must be two affine row-major 4 x 4 matrices, each ending in 0, 0, 0, 1",
+    ),
+    "empty texture": (
+        "[texture.a]",
+        "texture.a has none of them; a texture needs exactly one of checker, image, grating",
+    ),
+    "texture no table": ("[texture]\na = 1", "texture.a = 1: must be a table"),
+    "two textures in one": (
+        "[texture.a]\nchecker = { squares = [1, 1] }\nzone_plate = { k = 1 }",
+        "texture.a has checker and zone_plate together; a texture needs exactly one of",
+    ),
+    "texture key unknown": (
+        "[texture.a]\nchecked = 1",
+        "texture.a.checked = 1: unknown key 'checked'; did you mean 'checker'",
+    ),
+    "cutoff without image": (
+        "[texture.a]\nalpha_cutoff = 0.5\nzone_plate = { k = 1 }",
+        "texture.a.alpha_cutoff = 0.5: must be left out: it belongs to textures with an image",
+    ),
+    "cutoff over one": (
+        '[texture.a]\nimage = "x"\nalpha_cutoff = 2',
+        "texture.a.alpha_cutoff = 2: must be a finite number at",
+    ),
+    "no such image": ('[texture.a]\nimage = "gone.png"', "texture.a.image: image '"),
+    "squares zero": (
+        "[texture.a]\nchecker = { squares = [0, 1] }",
+        "texture.a.checker.squares = [0, 1]: must be two finite",
+    ),
+    "checker without squares": (
+        "[texture.a]\nchecker = {}",
+        "texture.a.checker.squares is missing; it must be a list of 2",
+    ),
+    "profile unknown": (
+        '[texture.a]\ngrating = { cycles = 4, profile = "sin" }',
+        "texture.a.grating.profile = \"sin\": unknown profile 'sin'; did you mean 'sine'",
+    ),
+    "cycles missing": (
+        "[texture.a]\ngrating = {}",
+        "texture.a.grating.cycles is missing; it must be a finite number at least 0",
+    ),
+    "zone plate without k": (
+        "[texture.a]\nzone_plate = {}",
+        "texture.a.zone_plate.k is missing; it must be a finite number over",
+    ),
+    "light without radiance": (
+        "[[light]]\nquad = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]",
+        "light[0].radiance is missing; it must be a list of 3 finite numbers",
+    ),
+    "light without area": (
+        "[[light]]\nquad = [[0, 0, 0], [1, 0, 0], [2, 0, 0], [3, 0, 0]]\nradiance = [1, 1, 1]",
+        "light[0].quad: has no area",
+    ),
+    "light a trapezium": (
+        "[[light]]\nquad = [[0, 0, 0], [3, 0, 0], [2, 1, 0], [0, 1, 0]]\nradiance = [1, 1, 1]",
+        "must be the four corners of a parallelogram, in order",
+    ),
+    "fact unknown": ("[fact.edges]", "fact.edges = {}: unknown key 'edges'; did you mean 'edge'"),
+    "edge of no length": (
+        OBJECT + EDGE + "to = [-1, 1, 0]",
+        "fact.edge[0].to = [-1, 1, 0]: must be a point that differs",
+    ),
+    "edge in front of every object": (
+        OBJECT + "[[fact.edge]]\nfrom = [-1, 1, 0.001]\nto = [1, 1, 0.001]",
+        "fact.edge[0] from [-1.0, 1.0, 0.001] to [1.0, 1.0, 0.001] touches no object; it must lie on one",
+    ),
+    "edge beside its side": (OBJECT + "[[fact.edge]]\nfrom = [2, 1, 0]\nto = [3, 1, 0]", "touches no object"),
+    "edge without end": (OBJECT + EDGE, "fact.edge[0].to is missing; it must be a list of 3 finite numbers"),
+    "no blades": (
+        ROTOR.replace("blades = 3", "blades = 0"),
+        "fact.rotor.blades = 0: must be a whole number, 1 or more",
+    ),
+    "duty of all": (
+        ROTOR.replace("duty = 0.5", "duty = 1"),
+        "fact.rotor.duty = 1: must be a finite number over 0 and under 1",
+    ),
+    "annulus inside out": (
+        ROTOR.replace("inner = 0.2", "inner = 0.9"),
+        "fact.rotor.inner = 0.9: must be less than outer, 0.8",
+    ),
+    "rotor about nothing": (ROTOR + "axis = [0, 0, 0]", "fact.rotor.axis = [0, 0, 0]: must be a direction"),
+    "rotor of another rate": (
+        ROTOR.replace("rev_per_s = 2\ninner", "rev_per_s = 3\ninner"),
+        "fact.rotor.rev_per_s = 3: must be the rate at which an object spins about this axis and center (2)",
+    ),
+    "rotor the other way round": (
+        ROTOR + "axis = [0, 0, -1]",
+        "must be the rate at which an object spins about this axis and",
+    ),
+    "rotor elsewhere": (ROTOR + "center = [1, 0, 0]", "spins about this axis and center (none)"),
+    "grating of nothing": (
+        "[fact.grating]\ncycles_per_unit = [0, 0]",
+        "fact.grating.cycles_per_unit = [0, 0]: must be a freq",
+    ),
+    "pan without period": (
+        PAN + "velocity = [1, 0, 0]\nperiod = 0",
+        "fact.pan.period = 0: must be a finite number over 0",
+    ),
+    "pan of nothing": (PAN + "velocity = [0, 0, 0]\nperiod = 1", "fact.pan.velocity = [0, 0, 0]: must be a direction"),
+    "pan that nothing makes": (
+        PAN + "velocity = [0, 2, 0]\nperiod = 1",
+        "fact.pan.velocity = [0, 2, 0]: must be how an object moves against the camera ([1.0, 0.0, 0.0])",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_what_is_wrong_is_refused_with_file_key_value_and_what_is_allowed(scene_file: Write, case: str) -> None:
+    text, message = REFUSED[case]
+    path = scene_file(text)
+    with pytest.raises(InputError) as caught:
+        load_scene(path)
+    said = str(caught.value)
+    assert said.startswith(f"{path}: ")
+    assert message in said
+    assert "\n" not in said
+
+
+def test_long_values_are_shortened(scene_file: Write) -> None:
+    path = scene_file(f"background = {list(range(1000))}")
+    with pytest.raises(InputError, match=r"background = \[0, 1, .*\.\.\.: must be") as caught:
+        load_scene(path)
+    assert len(str(caught.value)) < len(path) + 150

@@ -1,0 +1,180 @@
+"""Texture values follow the stated conventions, and filtering loses no light."""
+
+from functools import cache
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import OpenImageIO as oiio
+import pytest
+
+from aliasbench.scenes.errors import InputError
+from aliasbench.scenes.model import Checker, Grating, ImageTexture, Texture, ZonePlate
+from aliasbench.scenes.textures import MipChain, evaluate_point, linear_to_srgb, load_image, mip_chain, srgb_to_linear
+
+
+def write(path: Path, pixels: np.ndarray) -> Path:
+    out = oiio.ImageOutput.create(str(path))
+    assert out is not None, oiio.geterror()
+    kind = oiio.UINT8 if pixels.dtype == np.uint8 else oiio.FLOAT
+    assert out.open(str(path), oiio.ImageSpec(pixels.shape[1], pixels.shape[0], pixels.shape[2], kind))
+    assert out.write_image(pixels)
+    out.close()
+    return path
+
+
+def image(h: int, w: int) -> ImageTexture:
+    rng = np.random.default_rng(h * 100 + w)
+    return ImageTexture(rng.random((h, w, 4)).astype(np.float32))
+
+
+def test_srgb_has_its_published_values_and_undoes_itself() -> None:
+    encoded = np.linspace(0.0, 1.0, 256)
+    # the two pieces of the standard meet to 1e-8 only
+    np.testing.assert_allclose(linear_to_srgb(srgb_to_linear(encoded)), encoded, rtol=0, atol=1e-7)
+    np.testing.assert_allclose(srgb_to_linear(np.array([0.0, 0.5, 1.0])), [0.0, 0.21404114, 1.0], rtol=0, atol=1e-8)
+    # 1.055 - 0.055 is half an ulp off
+    np.testing.assert_allclose(linear_to_srgb(np.array([-1.0, 2.0])), [0.0, 1.0], rtol=0, atol=2**-52)
+
+
+def test_an_eight_bit_image_is_srgb_with_its_bottom_row_first(tmp_path: Path) -> None:
+    pixels = np.array([[[255, 0, 0], [0, 255, 0]], [[0, 0, 255], [128, 128, 128]]], np.uint8)
+    texture = load_image(write(tmp_path / "a.png", pixels))
+    assert texture.texels.shape == (2, 2, 4)
+    grey = float(srgb_to_linear(np.array(128 / 255)))
+    bottom_left = evaluate_point(texture, np.array([0.1, 0.1]))
+    bottom_right = evaluate_point(texture, np.array([0.9, 0.1]))
+    top_left = evaluate_point(texture, np.array([0.1, 0.9]))
+    assert bottom_left.tolist() == [0.0, 0.0, 1.0, 1.0]
+    # encoded values and texels are rounded to float32, the first magnified by the exponent 2.4
+    np.testing.assert_allclose(bottom_right, [grey, grey, grey, 1.0], rtol=3.4 * 2**-24)
+    assert top_left.tolist() == [1.0, 0.0, 0.0, 1.0]
+
+
+def test_a_float_image_is_linear_and_keeps_values_over_one(tmp_path: Path) -> None:
+    pixels = np.full((1, 1, 3), 4.5, np.float32)
+    assert load_image(write(tmp_path / "a.exr", pixels)).texels[0, 0].tolist() == [4.5, 4.5, 4.5, 1.0]
+
+
+def test_grey_and_alpha_are_told_apart(tmp_path: Path) -> None:
+    grey = load_image(write(tmp_path / "g.png", np.full((1, 1, 1), 255, np.uint8)))
+    assert grey.texels[0, 0].tolist() == [1.0, 1.0, 1.0, 1.0]
+    rgba = load_image(write(tmp_path / "a.png", np.array([[[255, 255, 255, 51]]], np.uint8)), alpha_cutoff=0.5)
+    assert rgba.alpha_cutoff == 0.5
+    assert rgba.texels[0, 0, 3] == pytest.approx(0.2, abs=1e-7)  # alpha is no light: not decoded
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [(None, "no such file"), (b"", "cannot be read"), (b"this is no picture", "cannot be read")],
+)
+def test_an_image_that_cannot_be_read_is_refused(tmp_path: Path, content: bytes | None, message: str) -> None:
+    path = tmp_path / "a.png"
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(InputError, match=f"image '.*a.png': {message}"):
+        load_image(path)
+
+
+def test_an_image_with_a_value_that_is_not_finite_is_refused(tmp_path: Path) -> None:
+    pixels = np.ones((2, 2, 3), np.float32)
+    pixels[1, 0, 2] = np.nan
+    with pytest.raises(InputError, match="has values that are not finite"):
+        load_image(write(tmp_path / "a.exr", pixels))
+
+
+@pytest.mark.parametrize("shift", [-3.0, 0.0, 5.0])
+def test_an_image_repeats_and_texel_k_covers_k_to_k_plus_one(shift: float) -> None:
+    texture = image(3, 4)
+    for column in range(4):
+        for row in range(3):
+            for a, b in ((0.001, 0.001), (0.5, 0.5), (0.999, 0.999)):
+                uv = np.array([(column + a) / 4 + shift, (row + b) / 3 - shift])
+                np.testing.assert_array_equal(evaluate_point(texture, uv), texture.texels[row, column])
+
+
+def test_the_first_square_of_a_checker_is_black_and_colours_are_kept() -> None:
+    texture = Checker((2.0, 4.0), black=(0.1, 0.0, 0.0), white=(0.0, 0.9, 0.0))
+    uv = np.array([[0.1, 0.1], [0.6, 0.1], [0.6, 0.3], [-0.1, 0.1], [1.1, 0.1]])
+    expected = [texture.black, texture.white, texture.black, texture.white, texture.black]
+    np.testing.assert_allclose(evaluate_point(texture, uv)[:, :3], expected, rtol=0, atol=1e-16)
+
+
+def test_a_grating_runs_along_its_angle_with_its_phase() -> None:
+    uv = np.array([[0.3, 0.2]])
+    s = 0.3 * np.cos(np.radians(30.0)) + 0.2 * np.sin(np.radians(30.0))
+    wave = np.cos(2 * np.pi * (5.0 * s + 0.2))
+    sine = evaluate_point(Grating(5.0, 30.0, 0.2), uv)[0]
+    np.testing.assert_allclose(sine, [(1 + wave) / 2] * 3 + [1.0], rtol=0, atol=1e-14)
+    square = evaluate_point(Grating(5.0, 30.0, 0.2, "square", (0.2,) * 3, (0.7,) * 3), uv)[0]
+    np.testing.assert_allclose(square[:3], 0.7 if wave > 0 else 0.2, rtol=0, atol=1e-15)
+
+
+def test_a_zone_plate_is_its_formula() -> None:
+    value = evaluate_point(ZonePlate((0.5, 0.25), 300.0, 1.0), np.array([0.9, 0.1]))
+    assert value[0] == pytest.approx((1 + np.cos(300.0 * (0.16 + 0.0225) + 1.0)) / 2, abs=1e-13)
+
+
+TEXTURES: dict[str, Texture] = {
+    "square": image(8, 8),
+    "wide": image(2, 16),
+    "odd": image(7, 5),
+    "prime": image(1, 13),
+    "one": image(1, 1),
+    "checker": Checker((7.0, 3.0)),
+    "grating": Grating(11.0, 20.0, 0.3),
+    "zone plate": ZonePlate((0.5, 0.5), 100.0),
+}
+
+
+@cache
+def chain_of(name: str) -> MipChain:
+    return mip_chain(TEXTURES[name])
+
+
+@pytest.mark.parametrize("name", TEXTURES)
+def test_every_level_of_a_mip_chain_has_the_mean_of_the_first(name: str) -> None:
+    chain = chain_of(name)
+    means = [level.mean(axis=(0, 1), dtype=np.float64) for level in chain.levels]
+    # each level is rounded to float32 once: half an ulp of 1 for each
+    for depth, mean in enumerate(means):
+        np.testing.assert_allclose(mean, means[0], rtol=0, atol=(depth + 1) * 2**-24)
+
+
+@pytest.mark.parametrize("name", TEXTURES)
+def test_levels_halve_down_to_one_texel(name: str) -> None:
+    shapes = [level.shape[:2] for level in chain_of(name).levels]
+    assert shapes[-1] == (1, 1)
+    for (h, w), (h2, w2) in pairwise(shapes):
+        assert (h2, w2) == (max(1, h // 2), max(1, w // 2))
+
+
+@pytest.mark.parametrize("name", ["checker", "grating", "zone plate", "odd"])
+def test_the_first_level_seen_through_its_matrix_is_the_texture(name: str) -> None:
+    texture, chain = TEXTURES[name], chain_of(name)
+    h, w = chain.levels[0].shape[:2]
+    rows, columns = np.mgrid[0:h:7, 0:w:7] if name != "odd" else np.mgrid[0:h, 0:w]
+    tile = np.stack([(columns.ravel() + 0.5) / w, (rows.ravel() + 0.5) / h])
+    linear, offset = chain.uv_matrix[:, :2], chain.uv_matrix[:, 2]
+    uv = (np.linalg.pinv(linear) @ (tile - offset[:, None])).T
+    expected = chain.levels[0][rows.ravel(), columns.ravel()]
+    # float32 texels; uv through the inverse costs some ulp of a phase of up to 100 radians
+    np.testing.assert_allclose(evaluate_point(texture, uv), expected, rtol=0, atol=2**-24 + 1e-12)
+
+
+def test_halving_an_even_image_averages_two_by_two() -> None:
+    texture = image(4, 6)
+    expected = texture.texels.astype(np.float64).reshape(2, 2, 3, 2, 4).mean(axis=(1, 3))
+    np.testing.assert_allclose(mip_chain(texture).levels[1], expected, rtol=0, atol=2**-24)
+
+
+def test_halving_three_texels_weighs_each_by_what_is_covered() -> None:
+    texture = ImageTexture(np.arange(12, dtype=np.float32).reshape(1, 3, 4))
+    expected = texture.texels.astype(np.float64).mean(axis=1)
+    np.testing.assert_allclose(mip_chain(texture).levels[1][:, 0], expected, rtol=2**-24)
+
+
+def test_texels_of_a_chain_are_read_only() -> None:
+    for level in mip_chain(image(4, 4)).levels:
+        assert level.dtype == np.float32
+        assert not level.flags.writeable
