@@ -148,7 +148,7 @@ def _expand(suite: SuiteFile, groups: Sequence[Group]) -> list[Case]:
 
 
 def _load(suite: SuiteFile, text: str) -> Scene:
-    beside = suite.folder / text if suite.folder else None
+    beside = suite.folder / text if suite.folder is not None else None
     try:
         return files.load_scene(str(beside) if beside is not None and beside.is_file() else text)
     except InputError as error:

@@ -162,7 +162,7 @@ SCENES: Mapping[str, SceneEntry] = MappingProxyType(
             "confetti",
             build_confetti,
             {
-                "count": Parameter(1000, 8, 4000, "int", "triangles in a square of the picture's height"),
+                "count": Parameter(4000, 8, 20000, "int", "triangles in a square of the picture's height"),
                 "size_px": Parameter(1.5, 0.2, 20.0, "float", "largest diameter, in pixels of a picture 256 high"),
                 "seed": Parameter(1, 0, 2**31 - 1, "int", "of places, shapes and colours"),
                 "speed": Parameter(0.08, -2.0, 2.0, "float", "drift to the right and up, world units per second"),

@@ -142,10 +142,8 @@ def _image_bounds(
     return float(left), float(right), float(top), float(bottom)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
-def turn_back(
-    values: FloatArray, c: float, s: float, x: float, y: float, z: float
-) -> tuple[float, float, float]:
+@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+def turn_back(values: FloatArray, c: float, s: float, x: float, y: float, z: float) -> tuple[float, float, float]:
     """Return R^T (x, y, z) for the rotation by (cosine, sine) about the body's axis (Rodrigues)."""
     kx, ky, kz = values[SPIN_AXIS], values[SPIN_AXIS + 1], values[SPIN_AXIS + 2]
     along = (1.0 - c) * (kx * x + ky * y + kz * z)
@@ -156,7 +154,7 @@ def turn_back(
     )
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
 def _rigid_lane(values: FloatArray, scratch: FloatArray, i: int) -> None:
     time = scratch[TIME + i]
     turns = values[TURNS] + time * values[TURNS_TRAVEL]
@@ -166,12 +164,16 @@ def _rigid_lane(values: FloatArray, scratch: FloatArray, i: int) -> None:
     y = scale * (scratch[OY + i] - values[SHIFT + 1] - time * values[SHIFT_TRAVEL + 1])
     z = scale * (scratch[OZ + i] - values[SHIFT + 2] - time * values[SHIFT_TRAVEL + 2])
     lx, ly, lz = turn_back(values, c, s, x, y, z)
-    scratch[LX + i], scratch[LY + i], scratch[LZ + i] = lx - values[PIVOT], ly - values[PIVOT + 1], lz - values[PIVOT + 2]
+    scratch[LX + i], scratch[LY + i], scratch[LZ + i] = (
+        lx - values[PIVOT],
+        ly - values[PIVOT + 1],
+        lz - values[PIVOT + 2],
+    )
     mx, my, mz = turn_back(values, c, s, scale * scratch[DX + i], scale * scratch[DY + i], scale * scratch[DZ + i])
     scratch[MX + i], scratch[MY + i], scratch[MZ + i] = mx, my, mz
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
 def _linear_lane(values: FloatArray, scratch: FloatArray, i: int) -> None:
     time = scratch[TIME + i]
     m00 = values[MATRIX] + time * values[MATRIX_TRAVEL]
@@ -201,7 +203,7 @@ def _linear_lane(values: FloatArray, scratch: FloatArray, i: int) -> None:
     scratch[MZ + i] = c * x + f * y + k * z
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
 def to_body(values: FloatArray, scratch: FloatArray) -> None:
     """Write the rays of all 16 lanes in the body's frame, in float64, each at its own time."""
     if values[KIND] == RIGID:
@@ -221,7 +223,7 @@ def lane_to_body(values: FloatArray, scratch: FloatArray, i: int) -> None:
         _linear_lane(values, scratch, i)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
 def fill_body_rays(scratch: FloatArray, ray: NDArray[np.float32], body_ray: NDArray[np.float32]) -> None:
     """Write the rays in the body's frame as Embree takes them, ending where the packet's nearest hits are."""
     for i in range(LANES):
@@ -234,7 +236,7 @@ def fill_body_rays(scratch: FloatArray, ray: NDArray[np.float32], body_ray: NDAr
         body_ray[RAY_TFAR + i] = ray[RAY_TFAR + i]
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
 def may_see(values: FloatArray, left: int, right: int, row: int) -> bool:
     """Return whether pixels left..right of a row may see the body."""
     return (

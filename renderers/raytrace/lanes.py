@@ -42,8 +42,8 @@ OX, OY, OZ, DX, DY, DZ = 48, 64, 80, 96, 112, 128
 U, V = 144, 160
 RED, GREEN, BLUE = 176, 192, 208
 LX, LY, LZ, MX, MY, MZ = 224, 240, 256, 272, 288, 304  # the ray in a body's frame
-LOD = 320
-SCRATCH_SIZE = 336
+LOD, DISTANCE = 320, 336
+SCRATCH_SIZE = 352
 
 # Rows of RTCRayHit16 (rtcore_ray.h), in lanes.
 RAY_OX, RAY_OY, RAY_OZ, RAY_TNEAR, RAY_DX, RAY_DY, RAY_DZ, RAY_TIME = 0, 16, 32, 48, 64, 80, 96, 112
@@ -142,9 +142,7 @@ def _fill_run(
 
 
 @njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
-def fill_positions(
-    pattern: Sampling, keys: KeyArray, row: int, first: int, lanes: int, scratch: FloatArray
-) -> None:
+def fill_positions(pattern: Sampling, keys: KeyArray, row: int, first: int, lanes: int, scratch: FloatArray) -> None:
     """Write the image positions of `lanes` samples of a row from its sample number `first` on."""
     column = first // pattern.samples
     index = (first - column * pattern.samples) & _INDEX_MASK
@@ -160,7 +158,7 @@ def fill_positions(
         column, index = column + 1, 0
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
 def fill_times(pattern: Sampling, keys: KeyArray, first: int, lanes: int, scratch: FloatArray) -> None:
     """Write the shutter positions of `lanes` samples of a row from its sample number `first` on."""
     column, index = first // pattern.samples, first % pattern.samples

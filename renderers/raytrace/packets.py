@@ -50,9 +50,7 @@ load_library()
 llvmlite.binding.load_library_permanently(str(library_path()))
 
 # A ctypes pointer would do the same, but kernels with one cannot be cached.
-_intersect16 = types.ExternalFunction(
-    "rtcIntersect16", types.void(types.intp, types.intp, types.intp, types.intp)
-)
+_intersect16 = types.ExternalFunction("rtcIntersect16", types.void(types.intp, types.intp, types.intp, types.intp))
 
 _COHERENT = 1 << 16
 _ALL_FEATURES = -1
@@ -107,7 +105,7 @@ def make_workspace(width: int) -> Workspace:
     )
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
 def _trace(scene: int, work: Workspace, lanes: int) -> None:
     """Find the nearest hits on the mesh that stands still, MISS where there is none."""
     for i in range(LANES):
@@ -122,7 +120,7 @@ def _trace(scene: int, work: Workspace, lanes: int) -> None:
         work.hits[i] = work.ray_ids[HIT_PRIM + i]
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
 def _trace_bodies(scenes: NDArray[np.int64], tables: Tables, work: Workspace, row: int, left: int, right: int) -> None:
     """Find nearer hits on the bodies that move, each in its own frame."""
     for body in range(len(scenes)):

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from aliasbench.renderers.raytrace.bodies import lane_to_body
 from aliasbench.renderers.raytrace.lanes import (
     BLUE,
+    DISTANCE,
     DX,
     DY,
     DZ,
@@ -39,7 +40,16 @@ from aliasbench.renderers.raytrace.lanes import (
     U,
     V,
 )
-from aliasbench.renderers.raytrace.texturing import COLOR, KIND, LEVEL, MIPMAP, PLAIN, UV_MATRIX, shade_lane, shade_packet
+from aliasbench.renderers.raytrace.texturing import (
+    COLOR,
+    KIND,
+    LEVEL,
+    MIPMAP,
+    PLAIN,
+    UV_MATRIX,
+    shade_lane,
+    shade_packet,
+)
 from aliasbench.scenes.model import FloatArray
 
 MISS = -1
@@ -95,7 +105,7 @@ def shade_flat(tables: Tables, hits: NDArray[np.int32], scratch: FloatArray) -> 
         _paint_lane(tables, hits[i], scratch, i)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
 def shade_textured(tables: Tables, camera: FloatArray, hits: NDArray[np.int32], scratch: FloatArray) -> None:
     """Write the colours of hits on any objects."""
     first = hits[0]
@@ -179,7 +189,7 @@ def _stretch(
     return s * s + r * r
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
 def _place_packet(tables: Tables, camera: FloatArray, hit: int, scratch: FloatArray) -> None:
     """Write texture coordinates, and levels of detail where needed, of 16 hits on one triangle that stands still.
 
@@ -189,11 +199,18 @@ def _place_packet(tables: Tables, camera: FloatArray, hit: int, scratch: FloatAr
     """
     row = tables.triangles[hit]
     values = tables.objects[tables.owners[hit]]
+    # Read before the loop: the compiler cannot know that writing coordinates leaves the triangle as it is.
+    nx, ny, nz, offset = row[0], row[1], row[2], row[OFFSET]
+    ax, ay, az, a0 = row[U_MAP], row[U_MAP + 1], row[U_MAP + 2], row[U_SHIFT]
+    bx, by, bz, b0 = row[V_MAP], row[V_MAP + 1], row[V_MAP + 2], row[V_SHIFT]
     for i in range(LANES):
-        _place(
-            row, scratch, i, scratch[OX + i], scratch[OY + i], scratch[OZ + i],
-            scratch[DX + i], scratch[DY + i], scratch[DZ + i],
-        )  # fmt: skip
+        ox, oy, oz = scratch[OX + i], scratch[OY + i], scratch[OZ + i]
+        dx, dy, dz = scratch[DX + i], scratch[DY + i], scratch[DZ + i]
+        t = (offset - (nx * ox + ny * oy + nz * oz)) / (nx * dx + ny * dy + nz * dz)
+        x, y, z = ox + t * dx, oy + t * dy, oz + t * dz
+        scratch[U + i] = ax * x + ay * y + az * z + a0
+        scratch[V + i] = bx * x + by * y + bz * z + b0
+        scratch[DISTANCE + i] = t
     if values[KIND] < MIPMAP:
         return
     step = tables.footprint / camera[SCALE]
@@ -204,8 +221,7 @@ def _place_packet(tables: Tables, camera: FloatArray, hit: int, scratch: FloatAr
     ux, uy, uz = camera[UP], camera[UP + 1], camera[UP + 2]
     for i in range(LANES):
         dx, dy, dz = scratch[DX + i], scratch[DY + i], scratch[DZ + i]
-        t = _place(row, scratch, i, scratch[OX + i], scratch[OY + i], scratch[OZ + i], dx, dy, dz)
-        weight = step * (1.0 + perspective * (t - 1.0))
+        weight = step * (1.0 + perspective * (scratch[DISTANCE + i] - 1.0))
         across = _stretch(row, values, width, height, weight, rx, ry, rz, dx, dy, dz)
         down = _stretch(row, values, width, height, weight, ux, uy, uz, dx, dy, dz)
         scratch[LOD + i] = max(across, down)

@@ -7,12 +7,24 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from aliasbench.renderers.raytrace.lanes import LANES, LOD, RED, U, V
+from aliasbench.renderers.raytrace.lanes import BLUE, GREEN, LANES, LOD, RED, U, V
 from aliasbench.renderers.raytrace.trig import cos_turns
 from aliasbench.scenes.model import FloatArray
 
 # Values of an object: colour, kind of texture, and what that kind needs.
-COLOR, KIND, PLACE, LOW, SPAN, PHASE, RATE, LEVEL, LEVELS, UV_MATRIX, OBJECT_SIZE = 0, 3, 4, 6, 9, 12, 13, 14, 15, 16, 22
+COLOR, KIND, PLACE, LOW, SPAN, PHASE, RATE, LEVEL, LEVELS, UV_MATRIX, OBJECT_SIZE = (
+    0,
+    3,
+    4,
+    6,
+    9,
+    12,
+    13,
+    14,
+    15,
+    16,
+    22,
+)
 PLAIN, CHECKER, SINE, SQUARE, ZONE = 0.0, 1.0, 2.0, 3.0, 4.0
 NEAREST, MIPMAP, TRILINEAR = 5.0, 6.0, 7.0
 
@@ -21,75 +33,99 @@ TexelArray = NDArray[np.float32]
 
 
 @njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
-def _checker_share(values: FloatArray, u: float, v: float) -> float:
-    count = np.floor(u * values[PLACE]) + np.floor(v * values[PLACE + 1])
+def _checker_share(u: float, v: float, across: float, up: float) -> float:
+    count = np.floor(u * across) + np.floor(v * up)
     return count - 2.0 * np.floor(count * 0.5)
 
 
 @njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
-def _sine_share(values: FloatArray, u: float, v: float) -> float:
-    return 0.5 + 0.5 * cos_turns(u * values[PLACE] + v * values[PLACE + 1] + values[PHASE])
+def _wave(u: float, v: float, across: float, up: float, phase: float) -> float:
+    return cos_turns(u * across + v * up + phase)
 
 
 @njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
-def _square_share(values: FloatArray, u: float, v: float) -> float:
-    return 0.5 + 0.5 * np.sign(cos_turns(u * values[PLACE] + v * values[PLACE + 1] + values[PHASE]))
+def _rings(u: float, v: float, center_u: float, center_v: float, rate: float, phase: float) -> float:
+    x, y = u - center_u, v - center_v
+    return cos_turns((x * x + y * y) * rate + phase)
 
 
 @njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
-def _zone_share(values: FloatArray, u: float, v: float) -> float:
-    x, y = u - values[PLACE], v - values[PLACE + 1]
-    return 0.5 + 0.5 * cos_turns((x * x + y * y) * values[RATE] + values[PHASE])
+def _blend(
+    scratch: FloatArray, i: int, share: float,
+    red: float, green: float, blue: float, to_red: float, to_green: float, to_blue: float,
+) -> None:  # fmt: skip
+    scratch[RED + i] = red + share * to_red
+    scratch[GREEN + i] = green + share * to_green
+    scratch[BLUE + i] = blue + share * to_blue
 
 
 @njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
-def _blend(values: FloatArray, share: float, scratch: FloatArray, i: int) -> None:
-    for k in range(3):
-        scratch[RED + k * LANES + i] = values[COLOR + k] * (values[LOW + k] + share * values[SPAN + k])
-
-
-@njit(cache=True, error_model="numpy", _nrt=False)
-def shade_packet(
-    objects: FloatArray, owner: int, levels: IndexArray, texels: TexelArray, scratch: FloatArray
-) -> None:
+def shade_packet(objects: FloatArray, owner: int, levels: IndexArray, texels: TexelArray, scratch: FloatArray) -> None:
     """Write the colours of 16 hits on one object, from their texture coordinates and levels of detail."""
     values = objects[owner]
     kind = values[KIND]
+    # Read before the loops: the compiler cannot know that writing colours leaves them as they are.
+    first, second, phase, rate = values[PLACE], values[PLACE + 1], values[PHASE], values[RATE]
+    red, green, blue = (
+        values[COLOR] * values[LOW],
+        values[COLOR + 1] * values[LOW + 1],
+        values[COLOR + 2] * values[LOW + 2],
+    )
+    to_red, to_green, to_blue = (
+        values[COLOR] * values[SPAN],
+        values[COLOR + 1] * values[SPAN + 1],
+        values[COLOR + 2] * values[SPAN + 2],
+    )
     if kind == CHECKER:
         for i in range(LANES):
-            _blend(values, _checker_share(values, scratch[U + i], scratch[V + i]), scratch, i)
+            share = _checker_share(scratch[U + i], scratch[V + i], first, second)
+            _blend(scratch, i, share, red, green, blue, to_red, to_green, to_blue)
     elif kind == SINE:
         for i in range(LANES):
-            _blend(values, _sine_share(values, scratch[U + i], scratch[V + i]), scratch, i)
+            share = 0.5 + 0.5 * _wave(scratch[U + i], scratch[V + i], first, second, phase)
+            _blend(scratch, i, share, red, green, blue, to_red, to_green, to_blue)
+    elif kind == SQUARE:
+        for i in range(LANES):
+            share = 0.5 + 0.5 * np.sign(_wave(scratch[U + i], scratch[V + i], first, second, phase))
+            _blend(scratch, i, share, red, green, blue, to_red, to_green, to_blue)
     elif kind == ZONE:
         for i in range(LANES):
-            _blend(values, _zone_share(values, scratch[U + i], scratch[V + i]), scratch, i)
+            share = 0.5 + 0.5 * _rings(scratch[U + i], scratch[V + i], first, second, rate, phase)
+            _blend(scratch, i, share, red, green, blue, to_red, to_green, to_blue)
     else:
         for i in range(LANES):
-            shade_lane(objects, owner, levels, texels, scratch, i)
+            _look_up(values, levels, texels, scratch, i)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
 def shade_lane(
     objects: FloatArray, owner: int, levels: IndexArray, texels: TexelArray, scratch: FloatArray, i: int
 ) -> None:
     """Write the colour of one hit, from its texture coordinates and level of detail."""
     values = objects[owner]
     kind = values[KIND]
-    u, v = scratch[U + i], scratch[V + i]
-    if kind == CHECKER:
-        _blend(values, _checker_share(values, u, v), scratch, i)
-    elif kind == SINE:
-        _blend(values, _sine_share(values, u, v), scratch, i)
-    elif kind == SQUARE:
-        _blend(values, _square_share(values, u, v), scratch, i)
-    elif kind == ZONE:
-        _blend(values, _zone_share(values, u, v), scratch, i)
-    else:
+    if kind >= NEAREST:
         _look_up(values, levels, texels, scratch, i)
+        return
+    u, v = scratch[U + i], scratch[V + i]
+    first, second, phase = values[PLACE], values[PLACE + 1], values[PHASE]
+    if kind == CHECKER:
+        share = _checker_share(u, v, first, second)
+    else:
+        if kind == ZONE:
+            share = _rings(u, v, first, second, values[RATE], phase)
+        else:
+            share = _wave(u, v, first, second, phase)
+            if kind == SQUARE:
+                share = np.sign(share)
+        share = 0.5 + 0.5 * share
+    for k in range(3):
+        scratch[RED + k * LANES + i] = values[COLOR + k] * values[LOW + k] + share * (
+            values[COLOR + k] * values[SPAN + k]
+        )
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
 def _look_up(values: FloatArray, levels: IndexArray, texels: TexelArray, scratch: FloatArray, i: int) -> None:
     """Write the colour of an image (or baked chain) from one level or between two."""
     kind, first = values[KIND], int(values[LEVEL])
@@ -121,7 +157,7 @@ def _look_up(values: FloatArray, levels: IndexArray, texels: TexelArray, scratch
     scratch[RED + 2 * LANES + i] = values[COLOR + 2] * blue
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
 def _bilinear(levels: IndexArray, texels: TexelArray, level: int, s: float, r: float) -> tuple[float, float, float]:
     first, width, height = levels[level, 0], levels[level, 1], levels[level, 2]
     x, y = s * width - 0.5, r * height - 0.5

@@ -13,7 +13,7 @@ _C11, _C13, _C15 = -1.0 / 39916800.0, 1.0 / 6227020800.0, -1.0 / 1307674368000.0
 _C17, _C19 = 1.0 / 355687428096000.0, -1.0 / 121645100408832000.0
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
 def sin_turns(turns: float) -> float:
     """Return sin(2 pi turns)."""
     part = turns - np.rint(turns)
@@ -22,13 +22,11 @@ def sin_turns(turns: float) -> float:
     folded = np.copysign(min(size, 0.5 - size), part)
     x = _TAU * folded
     y = x * x
-    poly = _C3 + y * (
-        _C5 + y * (_C7 + y * (_C9 + y * (_C11 + y * (_C13 + y * (_C15 + y * (_C17 + y * _C19))))))
-    )
+    poly = _C3 + y * (_C5 + y * (_C7 + y * (_C9 + y * (_C11 + y * (_C13 + y * (_C15 + y * (_C17 + y * _C19)))))))
     return x + x * (y * poly)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
 def cos_turns(turns: float) -> float:
     """Return cos(2 pi turns)."""
     part = abs(turns - np.rint(turns))

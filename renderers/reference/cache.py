@@ -2,7 +2,7 @@
 
 The key is a hash of everything that enters a reference: the scene's content, the size, the frame, the technique's
 fields that a reference knows, and the version of the algorithm. A file carries a checksum of its data, so that a
-damaged or half-written one is made anew; it appears under its name at once (`os.replace`), so two writers are safe. A
+damaged or half-written one is made anew; it appears under its name at once (renamed when whole), so two writers are safe. A
 cache that cannot be written costs time, not correctness.
 """
 
@@ -78,7 +78,7 @@ def _write(path: Path, stored: Stored) -> None:
         try:
             with os.fdopen(handle, "wb") as file:
                 file.write(_MAGIC + hashlib.sha256(body).digest() + body)
-            os.replace(name, path)
+            Path(name).replace(path)
         except OSError:
             Path(name).unlink(missing_ok=True)
             raise

@@ -3,17 +3,19 @@
 import numpy as np
 from numba import njit
 
+from aliasbench.scenes.model import FloatArray
 
-@njit(cache=True, nogil=True)
-def _two_difference(a, b):  # type: ignore[no-untyped-def]
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _two_difference(a: float, b: float) -> tuple[float, float]:
     """Return a - b rounded, and what the rounding lost (Knuth)."""
     s = a - b
     t = s - a
     return s, (a - (s - t)) - (b + t)
 
 
-@njit(cache=True, nogil=True)
-def _two_product(a, b):  # type: ignore[no-untyped-def]
+@njit(cache=True, nogil=True, error_model="numpy")
+def _two_product(a: float, b: float) -> tuple[float, float]:
     """Return a b rounded, and what the rounding lost (Dekker's splitting; fine below 1e150)."""
     p = a * b
     t = 134217729.0 * a
@@ -25,8 +27,8 @@ def _two_product(a, b):  # type: ignore[no-untyped-def]
     return p, ((ah * bh - p) + ah * bl + al * bh) + al * bl
 
 
-@njit(cache=True, nogil=True)
-def local_line(x0, y0, x1, y1, X, Y):  # type: ignore[no-untyped-def]
+@njit(cache=True, nogil=True, error_model="numpy")
+def local_line(x0: float, y0: float, x1: float, y1: float, X: float, Y: float) -> tuple[float, float]:
     """Return (c, m) of the line x = c + m y through two points, both relative to the corner (X, Y); y0 < y1.
 
     c is the cross product of the moved points over the difference of their heights. Both are taken in doubled
@@ -51,8 +53,8 @@ def local_line(x0, y0, x1, y1, X, Y):  # type: ignore[no-untyped-def]
     return c, m
 
 
-@njit(cache=True, nogil=True)
-def cross_lines(line, n, size, events, count):  # type: ignore[no-untyped-def]
+@njit(cache=True, nogil=True, error_model="numpy")
+def cross_lines(line: FloatArray, n: int, size: float, events: FloatArray, count: int) -> int:
     """Append the heights in (0, size) where lines end, meet the cell's sides or each other; return the new count."""
     for i in range(n):
         c, m, low, high = line[i]
@@ -76,8 +78,8 @@ def cross_lines(line, n, size, events, count):  # type: ignore[no-untyped-def]
     return count
 
 
-@njit(cache=True, nogil=True)
-def sort_prefix(values, n):  # type: ignore[no-untyped-def]
+@njit(cache=True, nogil=True, error_model="numpy")
+def sort_prefix(values: FloatArray, n: int) -> None:
     """Sort the first n values in place."""
     if n > 48:
         values[:n] = np.sort(values[:n])

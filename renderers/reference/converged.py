@@ -12,10 +12,12 @@ from numpy.typing import NDArray
 from scipy.special import stdtrit
 
 from aliasbench.renderers.reference.cache import Stored
+from aliasbench.renderers.reference.faces import Faces
 from aliasbench.renderers.reference.flat import over_bands, palette, scene_extent
 from aliasbench.renderers.reference.paths import Paths
-from aliasbench.renderers.reference.pieces import Faces, join_pieces, pieces_at
-from aliasbench.renderers.reference.scanlines import BILINEAR, GRID, SINE, ZONE, scan_rows
+from aliasbench.renderers.reference.pieces import join_pieces, pieces_at
+from aliasbench.renderers.reference.runs import BILINEAR, GRID, SINE, ZONE
+from aliasbench.renderers.reference.scanlines import scan_rows
 from aliasbench.renderers.sampling.hashing import combine, unit
 from aliasbench.scenes.errors import NotAvailableError
 from aliasbench.scenes.model import Checker, FloatArray, Grating, ImageTexture, Scene, Texture
@@ -36,7 +38,7 @@ class TextureTable:
     params: FloatArray
     sizes: NDArray[np.int64]
     offsets: NDArray[np.int64]
-    texels: NDArray[np.float32]
+    texels: FloatArray
 
 
 def texture_table(scene: Scene, *, linear: bool) -> TextureTable:
@@ -50,7 +52,7 @@ def texture_table(scene: Scene, *, linear: bool) -> TextureTable:
     n = len(scene.objects)
     kinds, maps, params = np.full(n, -1, np.int64), np.zeros((n, 2, 3)), np.zeros((n, 8))
     sizes, offsets = np.ones((n, 2), np.int64), np.zeros(n, np.int64)
-    blocks: list[NDArray[np.float32]] = []
+    blocks: list[FloatArray] = []
     placed: dict[str, int] = {}
     end = 0
     for index, surface in enumerate(scene.objects):
@@ -61,15 +63,13 @@ def texture_table(scene: Scene, *, linear: bool) -> TextureTable:
         sizes[index] = block.shape[:2]
         if surface.texture not in placed:
             placed[surface.texture] = end
-            blocks.append(np.asarray(block, dtype=np.float32).reshape(-1, 3))
+            blocks.append(np.asarray(block, dtype=np.float64).reshape(-1, 3))
             end += block.shape[0] * block.shape[1]
         offsets[index] = placed[surface.texture]
-    return TextureTable(kinds, maps, params, sizes, offsets, np.concatenate([*blocks, np.zeros((1, 3), np.float32)]))
+    return TextureTable(kinds, maps, params, sizes, offsets, np.concatenate([*blocks, np.zeros((1, 3))]))
 
 
-def _own_form(
-    name: str, texture: Texture, linear: bool
-) -> tuple[int, FloatArray, FloatArray, NDArray[np.floating]]:
+def _own_form(name: str, texture: Texture, linear: bool) -> tuple[int, FloatArray, FloatArray, NDArray[np.floating]]:
     """Return kind, map, params and texels of one texture."""
     params = np.zeros(8)
     if isinstance(texture, ImageTexture):

@@ -12,18 +12,22 @@ Any other filter is an integral over the same trapezoids.
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
-from aliasbench.renderers.reference.cells import cross_lines, local_line, sort_prefix
+from aliasbench.renderers.reference.slabs import add_area, cut_slabs, nearness_at, tie_of
+from aliasbench.scenes.model import FloatArray
 
-TIE = 1e-9  # nearer than this (relative) is in the same plane, where the later object wins
+IntArray = NDArray[np.int64]
+
 _MANY_LINES = 32
 _MAX_LEVEL = 5
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def cover_rows(
-    points, starts, planes, owners, instants, colors, perspective, extent, weights, rows, out
-):  # type: ignore[no-untyped-def]  # fmt: skip
+    points: FloatArray, starts: IntArray, planes: FloatArray, owners: IntArray, instants: IntArray,
+    colors: FloatArray, perspective: bool, extent: float, weights: FloatArray, rows: IntArray, out: FloatArray,
+) -> int:  # fmt: skip
     """Add weights[t] times the picture of every instant t to rows [rows[0], rows[1]) of `out` (h, w, 3).
 
     `colors` has a row for every object, then the background's. `extent` is the scene's size, for ties of depth.
@@ -88,8 +92,8 @@ def cover_rows(
     return work
 
 
-@njit(cache=True, nogil=True)
-def row_extent(points, begin, end, low, high):  # type: ignore[no-untyped-def]
+@njit(cache=True, nogil=True, error_model="numpy")
+def row_extent(points: FloatArray, begin: int, end: int, low: float, high: float) -> tuple[float, float]:
     """Return the least and greatest x of a convex piece between two heights."""
     lo, hi = np.inf, -np.inf
     for k in range(begin, end):
@@ -105,8 +109,8 @@ def row_extent(points, begin, end, low, high):  # type: ignore[no-untyped-def]
     return lo - 1e-9, hi + 1e-9
 
 
-@njit(cache=True, nogil=True)
-def _solid_extent(points, begin, end, row):  # type: ignore[no-untyped-def]
+@njit(cache=True, nogil=True, error_model="numpy")
+def _solid_extent(points: FloatArray, begin: int, end: int, row: int) -> tuple[float, float]:
     """Return the x range that a convex piece fills all through a row of pixels (empty: inf, -inf)."""
     lo, hi = -np.inf, np.inf
     low, high = np.inf, -np.inf
@@ -129,10 +133,11 @@ def _solid_extent(points, begin, end, row):  # type: ignore[no-untyped-def]
     return np.inf, -np.inf
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _pixel(
-    points, starts, planes, owners, colors, perspective, extent, cand, n, x, y, total, comp
-):  # type: ignore[no-untyped-def]  # fmt: skip
+    points: FloatArray, starts: IntArray, planes: FloatArray, owners: IntArray, colors: FloatArray, perspective: bool,
+    extent: float, cand: IntArray, n: int, x: float, y: float, total: FloatArray, comp: FloatArray,
+) -> int:  # fmt: skip
     """Sum the colours of one pixel, dividing it where too many edges meet; return the number of slabbed cells."""
     stack = np.empty((3 * _MAX_LEVEL + 4, 4))
     stack[0] = x, y, 1.0, 0.0
@@ -154,28 +159,12 @@ def _pixel(
     return work
 
 
-@njit(cache=True, nogil=True)
-def _add(total, comp, color, area):  # type: ignore[no-untyped-def]
-    """Add area times colour, keeping what each sum loses (Neumaier)."""
-    for c in range(3):
-        value = color[c] * area
-        s = total[c] + value
-        if abs(total[c]) >= abs(value):
-            comp[c] += (total[c] - s) + value
-        else:
-            comp[c] += (value - s) + total[c]
-        total[c] = s
-
-
-@njit(cache=True, nogil=True)
-def _near(plane, x, y):  # type: ignore[no-untyped-def]
-    return plane[0] * x + plane[1] * y + plane[2]
-
-
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _cell(
-    points, starts, planes, owners, colors, perspective, extent, cand, n, X, Y, size, divisible, total, comp
-):  # type: ignore[no-untyped-def]  # fmt: skip
+    points: FloatArray, starts: IntArray, planes: FloatArray, owners: IntArray, colors: FloatArray, perspective: bool,
+    extent: float, cand: IntArray, n: int, X: float, Y: float, size: float, divisible: bool, total: FloatArray,
+    comp: FloatArray,
+) -> int:  # fmt: skip
     """Sum the colours of one cell; return 0 if one colour fills it, 1 if it took slabs, 2 if it must be divided."""
     kept = np.empty(n, np.int64)
     edges = np.empty(n, np.int64)  # how many edges of the piece cross the cell; 0: it fills the cell
@@ -200,38 +189,37 @@ def _cell(
     count = _drop_hidden(planes, owners, perspective, extent, kept, edges, count, X, Y, size)
     lines = edges[:count].sum()
     if count == 0:
-        _add(total, comp, colors[-1], size * size)
+        add_area(total, comp, colors[-1], size * size)
         return 0
     if count == 1 and lines == 0:
-        _add(total, comp, colors[owners[kept[0]]], size * size)
+        add_area(total, comp, colors[owners[kept[0]]], size * size)
         return 0
     if divisible and lines > _MANY_LINES:
         return 2
-    _slabs(
+    cut_slabs(
         points, starts, planes, owners, colors, perspective, extent,
         kept, edges, count, lines, X, Y, size, total, comp,
     )  # fmt: skip
     return 1
 
 
-@njit(cache=True, nogil=True)
-def _tie(perspective, extent, a, b):  # type: ignore[no-untyped-def]
-    return TIE * (max(abs(a), abs(b)) if perspective else extent)
-
-
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _drop_hidden(
-    planes, owners, perspective, extent, kept, edges, count, X, Y, size
-):  # type: ignore[no-untyped-def]  # fmt: skip
+    planes: FloatArray, owners: IntArray, perspective: bool, extent: float, kept: IntArray, edges: IntArray,
+    count: int, X: float, Y: float, size: float,
+) -> int:  # fmt: skip
     """Drop what lies behind a piece that fills the cell; return how many pieces are left."""
     front, best = -1, -np.inf
     for a in range(count):
         if edges[a] == 0:
             p = planes[kept[a], 0]
             low = min(
-                _near(p, X, Y), _near(p, X + size, Y), _near(p, X, Y + size), _near(p, X + size, Y + size)
+                nearness_at(p, X, Y),
+                nearness_at(p, X + size, Y),
+                nearness_at(p, X, Y + size),
+                nearness_at(p, X + size, Y + size),
             )
-            tie = _tie(perspective, extent, low, best) if front >= 0 else 0.0
+            tie = tie_of(perspective, extent, low, best) if front >= 0 else 0.0
             if front < 0 or low > best + tie or (low >= best - tie and owners[kept[a]] > owners[kept[front]]):
                 front, best = a, low
     if front < 0 or count == 1:
@@ -245,8 +233,8 @@ def _drop_hidden(
             strictly, weakly = True, True
             for corner in range(4):
                 x, y = X + size * (corner % 2), Y + size * (corner // 2)
-                v, w = _near(planes[f, 0], x, y), _near(planes[i, 0], x, y)
-                tie = _tie(perspective, extent, v, w)
+                v, w = nearness_at(planes[f, 0], x, y), nearness_at(planes[i, 0], x, y)
+                tie = tie_of(perspective, extent, v, w)
                 strictly = strictly and v - w > tie
                 weakly = weakly and v - w >= -tie
             hidden = strictly or (weakly and owners[f] >= owners[i])
@@ -254,132 +242,3 @@ def _drop_hidden(
             kept[size_kept], edges[size_kept] = i, edges[a]
             size_kept += 1
     return size_kept
-
-
-@njit(cache=True, nogil=True)
-def _slabs(
-    points, starts, planes, owners, colors, perspective, extent,
-    kept, edges, count, lines, X, Y, size, total, comp,
-):  # type: ignore[no-untyped-def]  # fmt: skip
-    """Cut a cell into slabs and spans, and add the colour seen in each."""
-    room = lines
-    for a in range(count):
-        for b in range(a):
-            if _planes_meet(planes[kept[a], 0], planes[kept[b], 0], perspective, extent, X, Y, size):
-                room += 1
-    # columns: intercept at the cell's top, slope dx/dy, first and last height; all relative to the cell's corner
-    line = np.empty((room, 4))
-    piece = np.empty(room, np.int64)  # the index into `kept`, -1 where two planes meet
-    side = np.empty(room, np.int64)  # -1: the piece is to the right of the line; 1: to the left
-    band = np.empty((count, 2))
-    events = np.empty(2 + 2 * count + 4 * room + room * (room - 1) // 2 + room)
-    nl, ne = 0, 2
-    events[0], events[1] = 0.0, size
-    for a in range(count):
-        i = kept[a]
-        band[a] = 0.0, size
-        if edges[a] == 0:
-            continue
-        low, high = np.inf, -np.inf
-        for k in range(starts[i], starts[i + 1]):
-            j = k + 1 if k + 1 < starts[i + 1] else starts[i]
-            low, high = min(low, points[k, 1]), max(high, points[k, 1])
-            dx, dy = points[j, 0] - points[k, 0], points[j, 1] - points[k, 1]
-            f = dx * (Y + size / 2 - points[k, 1]) - dy * (X + size / 2 - points[k, 0])
-            if f >= (abs(dx) + abs(dy)) * size / 2:
-                continue
-            e, g = (k, j) if dy > 0.0 else (j, k)
-            if points[g, 1] <= Y or points[e, 1] >= Y + size or not points[g, 1] - points[e, 1] > 1e-15:
-                continue
-            c, m = local_line(points[e, 0], points[e, 1], points[g, 0], points[g, 1], X, Y)
-            line[nl] = c, m, points[e, 1] - Y, points[g, 1] - Y
-            piece[nl], side[nl] = a, 1 if dy > 0.0 else -1
-            nl += 1
-        band[a] = low - Y, high - Y
-        for y in (low - Y, high - Y):
-            if 0.0 < y < size:
-                events[ne] = y
-                ne += 1
-    for a in range(count):
-        for b in range(a):
-            p, q = planes[kept[a], 0], planes[kept[b], 0]
-            if not _planes_meet(p, q, perspective, extent, X, Y, size):
-                continue
-            da, db = p[0] - q[0], p[1] - q[1]
-            dc = _near(p, X, Y) - _near(q, X, Y)
-            if abs(da) <= 1e-12 * abs(db):
-                y = -dc / db
-                if 0.0 < y < size:
-                    events[ne] = y
-                    ne += 1
-            else:
-                line[nl] = -dc / da, -db / da, 0.0, size
-                piece[nl], side[nl] = -1, 0
-                nl += 1
-    ne = cross_lines(line, nl, size, events, ne)
-    sort_prefix(events, ne)
-    xs = np.empty(nl + 2)
-    spans = np.empty((count, 2))
-    previous = 0.0
-    for k in range(1, ne):
-        # nothing is lost by joining a slab of no height to the next one
-        if events[k] - previous <= 1e-15 * size and k + 1 < ne:
-            continue
-        height = events[k] - previous
-        middle = previous + height / 2
-        previous = events[k]
-        nx = 1
-        xs[0] = 0.0
-        for a in range(count):
-            inside = edges[a] == 0 or (band[a, 0] <= middle <= band[a, 1])
-            spans[a] = (-np.inf, np.inf) if inside else (1.0, 0.0)
-        for e in range(nl):
-            if line[e, 2] <= middle <= line[e, 3]:
-                x = line[e, 0] + line[e, 1] * middle
-                if side[e] > 0:
-                    spans[piece[e], 1] = min(spans[piece[e], 1], x)
-                elif side[e] < 0:
-                    spans[piece[e], 0] = max(spans[piece[e], 0], x)
-                if 0.0 < x < size:
-                    xs[nx] = x
-                    nx += 1
-        xs[nx] = size
-        nx += 1
-        sort_prefix(xs, nx)
-        begin, shown = 0.0, -2
-        for s in range(1, nx):
-            x = (xs[s - 1] + xs[s]) / 2
-            owner = _front(planes, owners, perspective, extent, kept, spans, count, X, Y, x, middle)
-            # equal colours side by side are one trapezoid
-            if s > 1 and owner != shown:
-                _add(total, comp, colors[shown], height * (xs[s - 1] - begin))
-                begin = xs[s - 1]
-            shown = owner
-        _add(total, comp, colors[shown], height * (size - begin))
-
-
-@njit(cache=True, nogil=True)
-def _planes_meet(p, q, perspective, extent, X, Y, size):  # type: ignore[no-untyped-def]
-    """Return whether each of two planes is the nearer one somewhere in the cell."""
-    low, high, tie = np.inf, -np.inf, 0.0
-    for corner in range(4):
-        x, y = X + size * (corner % 2), Y + size * (corner // 2)
-        v, w = _near(p, x, y), _near(q, x, y)
-        low, high, tie = min(low, v - w), max(high, v - w), max(tie, _tie(perspective, extent, v, w))
-    return low < -tie and high > tie
-
-
-@njit(cache=True, nogil=True)
-def _front(
-    planes, owners, perspective, extent, kept, spans, count, X, Y, x, y
-):  # type: ignore[no-untyped-def]  # fmt: skip
-    """Return the object that is seen at a point of the cell, -1 for none."""
-    shown, best = -1, 0.0
-    for a in range(count):
-        if spans[a, 0] <= x <= spans[a, 1]:
-            i = kept[a]
-            v = _near(planes[i, 0], X + x, Y + y)
-            tie = _tie(perspective, extent, v, best)
-            if shown < 0 or v > best + tie or (v >= best - tie and owners[i] > shown):
-                shown, best = owners[i], v
-    return shown

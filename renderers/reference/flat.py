@@ -4,13 +4,15 @@ import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from aliasbench.renderers.reference.coverage import cover_rows
+from aliasbench.renderers.reference.faces import Faces
 from aliasbench.renderers.reference.paths import Paths
-from aliasbench.renderers.reference.pieces import Faces, Pieces, join_pieces, pieces_at
+from aliasbench.renderers.reference.pieces import Pieces, join_pieces, pieces_at
 from aliasbench.renderers.reference.shutter import bound_crossings, bound_edges
 from aliasbench.scenes.model import FloatArray, Scene
 from aliasbench.scenes.projection import View, view_at
@@ -24,6 +26,8 @@ _BAND = 16
 # Prices in nanoseconds, measured; they choose the number of slices, so they are constants and not clocks.
 _PIXEL_COST, _CELL_COST, _BUDGET = 12.0, 900.0, 4e9
 
+Answer = TypeVar("Answer")
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Integral:
@@ -33,10 +37,13 @@ class Integral:
     bound: FloatArray
 
 
-def over_bands(draw: Callable[[NDArray[np.int64]], object], height: int) -> list[object]:
+def over_bands(draw: Callable[[NDArray[np.int64]], Answer], height: int) -> list[Answer]:
     """Call `draw` for bands of rows, (first, last + 1), on all cores; the bands do not depend on their number."""
     bands = [np.array([r, min(r + _BAND, height)], np.int64) for r in range(0, height, _BAND)]
-    threads = min(len(bands), len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1)
+    # below a few bands starting threads costs more than they gain
+    threads = min(
+        len(bands) // 4, len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    )
     if threads <= 1:
         return [draw(b) for b in bands]
     with ThreadPoolExecutor(threads) as pool:
@@ -74,7 +81,7 @@ def _cover(scene: Scene, view: View, pieces: Pieces, weights: FloatArray, out: F
             extent, weights, rows, out,
         )  # fmt: skip
 
-    return sum(int(str(n)) for n in over_bands(draw, view.height))
+    return sum(over_bands(draw, view.height))
 
 
 def draw_shutter(
@@ -84,15 +91,15 @@ def draw_shutter(
 
     The number of slices follows from the bound of a few slices (it falls as 1 / n), within a fixed amount of work.
     """
-    pilot, work = _slices(scene, faces, paths, size, frame, _PILOT)
+    pilot, work = draw_slices(scene, faces, paths, size, frame, _PILOT)
     price = size[0] * size[1] * _PIXEL_COST + work / _PILOT * _CELL_COST
     affordable = min(_MOST_SLICES, int(_BUDGET / price))
     needed = int(np.ceil(_PILOT * float(pilot.bound.max()) / target * 1.05))
     count = max(_PILOT, min(needed, affordable))
-    return pilot if count == _PILOT else _slices(scene, faces, paths, size, frame, count)[0]
+    return pilot if count == _PILOT else draw_slices(scene, faces, paths, size, frame, count)[0]
 
 
-def _slices(
+def draw_slices(
     scene: Scene, faces: Faces, paths: Paths, size: tuple[int, int], frame: int, count: int
 ) -> tuple[Integral, int]:
     """Return the mean over `count` slices, and how many cells needed slabs."""
@@ -103,8 +110,9 @@ def _slices(
     kinds, turns = _kinds_and_turns(scene, paths, frame)
     layered = is_layered(scene, paths, frame)
     extent = scene_extent(scene)
+    span = float((colors.max(axis=0) - colors.min(axis=0)).max())
     pixels, bound = np.zeros((size[1], size[0], 3)), np.zeros((size[1], size[0]))
-    work = 0
+    work, loose = 0, 0
     for start in range(0, count, _CHUNK):
         fractions = [(k + 0.5) * length for k in range(start, min(count, start + _CHUNK))]
         views = [view_at(scene.camera, scene.animation, frame, f, size) for f in fractions]
@@ -116,8 +124,8 @@ def _slices(
 
         def bind(rows: NDArray[np.int64], pieces: Pieces = pieces, view: View = view) -> None:
             bound_edges(
-                pieces.points, pieces.speeds, pieces.reach, pieces.outlined, pieces.starts, pieces.owners, pieces.instants,
-                contrasts, length, 1.0 / count, rows, bound,
+                pieces.points, pieces.speeds, pieces.reach, pieces.outlined, pieces.starts, pieces.owners,
+                pieces.instants, contrasts, length, 1.0 / count, rows, bound,
             )  # fmt: skip
             if not layered:
                 center = np.array([view.width / 2, view.height / 2])
@@ -128,9 +136,9 @@ def _slices(
                 )  # fmt: skip
 
         over_bands(bind, size[1])
-    span = float((colors.max(axis=0) - colors.min(axis=0)).max())
+        loose += pieces.loose
     rounding = ROUNDING * float(np.abs(colors).max())
-    return Integral(pixels, np.minimum(bound, span) + rounding), work
+    return Integral(pixels, np.minimum(bound + span * loose / count, span) + rounding), work
 
 
 def _kinds_and_turns(scene: Scene, paths: Paths, frame: int) -> tuple[NDArray[np.int64], FloatArray]:

@@ -1,8 +1,8 @@
 """The scene at one instant as convex pieces in the picture: what every exact reference starts from.
 
-Faces (outlines of convex polygons, else triangles) are taken to camera space, cut by the near plane and by the picture's
-border with a margin, and projected. Cutting before the division keeps coordinates small, so a plane that runs behind the
-camera loses no digits. Everything that neighbours share is computed from the same numbers in the same order, whichever
+Faces (outlines of convex polygons, else triangles) are taken to camera space, cut by the near plane and by the border
+of the picture with a margin, and projected. Cutting before the division keeps coordinates small, so a plane that runs
+behind the camera loses no digits. Everything that neighbours share is computed from the same numbers in the same order, whichever
 face asks: shared edges stay shared to the last bit, and parts of a plane leave no gap.
 
 Nearness (minus the depth, or 1 / depth under perspective) and texture coordinates (times nearness) are affine in the
@@ -15,43 +15,17 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from aliasbench.renderers.reference.faces import Faces
 from aliasbench.renderers.reference.paths import Paths
-from aliasbench.scenes.model import FloatArray, Scene, Surface
+from aliasbench.scenes.model import FloatArray
 from aliasbench.scenes.projection import View
+
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
 
 MARGIN_PX = 4.0  # scenes go on outside the picture; the shutter's bound needs room for what comes in during a slice
 _NEAR = 1e-9  # relative to the largest camera coordinate
 _PLANES = 5
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Faces:
-    """Flat faces of all objects, at rest.
-
-    Attributes
-    ----------
-    vertices : (n, 3) float64
-    uv : (n, 2) float64
-    corners, starts : (k,) and (m + 1,) int64
-        Vertices of face i: corners[starts[i]:starts[i + 1]], in order, convex.
-    outlined : (k,) bool
-        Whether the edge from a corner to the next one is on the object's outline.
-    spread : (m, 3) int64
-        Three vertices that give the face's plane and texture map; the same for all faces of a polygon.
-    owners : (m,) int64
-        The object of each face.
-    ranges : tuple of slices
-        The vertices of each object.
-    """
-
-    vertices: FloatArray
-    uv: FloatArray
-    corners: NDArray[np.int64]
-    starts: NDArray[np.int64]
-    outlined: NDArray[np.bool_]
-    spread: NDArray[np.int64]
-    owners: NDArray[np.int64]
-    ranges: tuple[slice, ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,6 +47,9 @@ class Pieces:
     owners : (m,) int64
     instants : (t + 1,) int64
         The pieces of instant i: instants[i] to instants[i + 1].
+    loose : int
+        In how many instants something may come into the picture, within the slice around it, that is not among the
+        pieces: from beyond the margin, or through the near plane.
     """
 
     points: FloatArray
@@ -83,88 +60,17 @@ class Pieces:
     planes: FloatArray
     owners: NDArray[np.int64]
     instants: NDArray[np.int64]
-
-
-def build_faces(scene: Scene) -> Faces:
-    """Return the faces of a scene's objects: a convex polygon is one, anything else one for each triangle."""
-    vertices, uv, ranges = [np.zeros((0, 3))], [np.zeros((0, 2))], []
-    corners: list[int] = []
-    starts, outlined, spread, owners = [0], [], [], []
-    offset = 0
-    for index, surface in enumerate(scene.objects):
-        n = len(surface.vertices)
-        vertices.append(surface.vertices)
-        uv.append(surface.uv if surface.uv is not None else np.zeros((n, 2)))
-        ranges.append(slice(offset, offset + n))
-        whole = surface.is_polygon and (surface.texture is None or _is_affine(surface))
-        common = _spread(surface.vertices) if whole else None
-        if surface.is_polygon and whole and _is_convex(surface.vertices):
-            loops, flags = [list(range(n))], [[True] * n]
-        else:
-            loops = [t for t in surface.triangles.tolist() if len(set(t)) == 3]
-            flags = _outline_flags(surface, loops)
-        for loop, flag in zip(loops, flags, strict=True):
-            corners.extend(v + offset for v in loop)
-            outlined.extend(flag)
-            starts.append(len(corners))
-            spread.append([v + offset for v in (common or loop)])
-            owners.append(index)
-        offset += n
-    return Faces(
-        np.concatenate(vertices),
-        np.concatenate(uv),
-        np.array(corners, np.int64),
-        np.array(starts, np.int64),
-        np.array(outlined, bool),
-        np.array(spread, np.int64).reshape(-1, 3),
-        np.array(owners, np.int64),
-        tuple(ranges),
-    )
-
-
-def _outline_flags(surface: Surface, loops: list[list[int]]) -> list[list[bool]]:
-    """Return for each edge of each triangle whether it is no diagonal; every edge of a mesh may be a silhouette."""
-    edges = [[tuple(sorted((t[k], t[(k + 1) % 3]))) for k in range(3)] for t in loops]
-    seen: dict[tuple[int, ...], int] = {}
-    for edge in (e for triangle in edges for e in triangle):
-        seen[edge] = seen.get(edge, 0) + 1
-    return [[not surface.is_polygon or seen[e] == 1 for e in triangle] for triangle in edges]
-
-
-def _spread(vertices: FloatArray) -> list[int]:
-    """Return three far-apart vertices: the farthest from the first, and the farthest from the line through both."""
-    v = vertices - vertices[0]
-    b = int(np.argmax((v**2).sum(axis=1)))
-    c = int(np.argmax((np.cross(v, v[b]) ** 2).sum(axis=1)))
-    return [0, b, c]
-
-
-def _is_convex(vertices: FloatArray) -> bool:
-    edge = np.roll(vertices, -1, axis=0) - vertices
-    turns = np.cross(edge, np.roll(edge, -1, axis=0))
-    normal = np.cross(vertices - vertices[0], np.roll(vertices, -1, axis=0) - vertices[0]).sum(axis=0)
-    if (turns @ normal < 0.0).any():
-        return False
-    # all turns to one side and one turn in total: a star polygon turns twice
-    lengths = np.linalg.norm(edge, axis=1)
-    following = np.roll(edge, -1, axis=0)
-    angles = np.arctan2(np.linalg.norm(turns, axis=1), (edge * following).sum(axis=1))
-    return bool((lengths > 0).all() and abs(angles.sum() - 2 * np.pi) < 1e-6)
-
-
-def _is_affine(surface: Surface) -> bool:
-    """Return whether one affine map takes all of a polygon's vertices to their texture coordinates."""
-    if surface.uv is None:
-        return True
-    a, b, c = _spread(surface.vertices)
-    e1, e2 = surface.vertices[b] - surface.vertices[a], surface.vertices[c] - surface.vertices[a]
-    weights = np.linalg.lstsq(np.stack([e1, e2], axis=1), (surface.vertices - surface.vertices[a]).T, rcond=None)[0].T
-    predicted = surface.uv[a] + weights @ np.stack([surface.uv[b] - surface.uv[a], surface.uv[c] - surface.uv[a]])
-    return bool(np.abs(predicted - surface.uv).max() <= 1e-12 * max(1.0, float(np.abs(surface.uv).max())))
+    loose: int
 
 
 def pieces_at(
-    faces: Faces, paths: Paths, view: View, frame: int, fraction: float, slice_length: float = 0.0, in_layers: bool = False
+    faces: Faces,
+    paths: Paths,
+    view: View,
+    frame: int,
+    fraction: float,
+    slice_length: float = 0.0,
+    in_layers: bool = False,
 ) -> Pieces:
     """Return the pieces of one instant.
 
@@ -206,14 +112,21 @@ def pieces_at(
     outlined, starts = np.empty(room, np.bool_), np.zeros(count + 1, np.int64)
     planes, owners = np.empty((count, 4, 3)), np.empty(count, np.int64)
     widest = int(np.diff(faces.starts).max(initial=0)) + _PLANES + 1
-    k, m = _clip_project(
+    k, m, loose = _clip_project(
         camera, speed, drift, faces.uv, faces.corners, faces.starts, faces.outlined, faces.spread, faces.owners,
         near, half, view.perspective, view.scale, view.width / 2, view.height / 2, slice_length,
         np.empty((2, widest, 8)), points, speeds, reach, outlined, starts, planes, owners,
     )  # fmt: skip
-    return Pieces(  # fmt: skip
-        points[:k], speeds[:k], reach[:k], outlined[:k], starts[: m + 1], planes[:m], owners[:m],
+    return Pieces(
+        points[:k],
+        speeds[:k],
+        reach[:k],
+        outlined[:k],
+        starts[: m + 1],
+        planes[:m],
+        owners[:m],
         np.array([0, m], np.int64),
+        int(loose),
     )
 
 
@@ -230,12 +143,18 @@ def join_pieces(parts: list[Pieces]) -> Pieces:
         np.concatenate([p.planes for p in parts]),
         np.concatenate([p.owners for p in parts]),
         counts.astype(np.int64),
+        sum(p.loose for p in parts),
     )
 
 
-@njit(cache=True, nogil=True)
-def _cut(points, n, plane, half, near, perspective, out):  # type: ignore[no-untyped-def]
-    """Write a convex polygon's part on the inner side of one plane; return its size. Columns: x y z speed outlined drift slack."""
+@njit(cache=True, nogil=True, error_model="numpy")
+def _cut(
+    points: FloatArray, n: int, plane: int, half: FloatArray, near: float, perspective: bool, out: FloatArray,
+) -> int:  # fmt: skip
+    """Write a convex polygon's part on the inner side of one plane; return its size.
+
+    Columns: x, y, z, speed, outlined, drift (2), slack.
+    """
     size = 0
     for i in range(n):
         a, b = points[i], points[(i + 1) % n]
@@ -257,8 +176,8 @@ def _cut(points, n, plane, half, near, perspective, out):  # type: ignore[no-unt
     return size
 
 
-@njit(cache=True, nogil=True)
-def _inside(p, plane, half, near, perspective):  # type: ignore[no-untyped-def]
+@njit(cache=True, nogil=True, error_model="numpy")
+def _inside(p: FloatArray, plane: int, half: FloatArray, near: float, perspective: bool) -> float:
     """Return the signed distance (up to a factor) to the near plane (0) or a side of the picture (1 to 4)."""
     if plane == 0:
         return p[2] - near
@@ -267,14 +186,15 @@ def _inside(p, plane, half, near, perspective):  # type: ignore[no-untyped-def]
     return reach - value if plane % 2 else reach + value
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _clip_project(
-    camera, speed, drift, uv, corners, first, edge_flags, spread, face_owners,
-    near, half, perspective, scale, cx, cy, slice_length,
-    work, points, speeds, reach, outlined, starts, planes, owners,
-):  # type: ignore[no-untyped-def]  # fmt: skip
-    """Fill the output arrays; return the numbers of corners and pieces."""
-    k, m = 0, 0
+    camera: FloatArray, speed: FloatArray, drift: FloatArray, uv: FloatArray, corners: IntArray, first: IntArray,
+    edge_flags: BoolArray, spread: IntArray, face_owners: IntArray, near: float, half: FloatArray, perspective: bool,
+    scale: float, cx: float, cy: float, slice_length: float, work: FloatArray, points: FloatArray, speeds: FloatArray,
+    reach: FloatArray, outlined: BoolArray, starts: IntArray, planes: FloatArray, owners: IntArray,
+) -> tuple[int, int, bool]:  # fmt: skip
+    """Fill the output arrays; return the numbers of corners and pieces, and whether more may come in."""
+    k, m, loose = 0, 0, False
     for f in range(len(face_owners)):
         n = first[f + 1] - first[f]
         now = 0
@@ -286,6 +206,8 @@ def _clip_project(
             work[now, i, 4] = 1.0 if edge_flags[first[f] + i] else 0.0
             for c in range(3):
                 work[now, i, 5 + c] = drift[v, c] if len(drift) > 0 else 0.0
+        if slice_length > 0.0 and not loose:
+            loose = _may_come_in(work[now], n, half, near, perspective, scale, len(drift) > 0, slice_length / 2)
         for plane in range(5):
             n = _cut(work[now], n, plane, half, near, perspective, work[1 - now])
             now = 1 - now
@@ -338,11 +260,49 @@ def _clip_project(
         k += n
         m += 1
         starts[m] = k
-    return k, m
+    return k, m, loose
 
 
-@njit(cache=True, nogil=True)
-def _reverse(points, speeds, reach, outlined, n):  # type: ignore[no-untyped-def]
+@njit(cache=True, nogil=True, error_model="numpy")
+def _may_come_in(
+    corners: FloatArray, n: int, half: FloatArray, near: float, perspective: bool, scale: float, in_layers: bool,
+    time: float,
+) -> bool:  # fmt: skip
+    """Return whether a part of a face that is cut away now may be seen at another time of the slice.
+
+    A point beyond the margin has to move by more than the margin: orthographically in pixels; under perspective within
+    `margin z / scale` of the world, so its depth is small, and the face's plane must pass close by the camera.
+    """
+    fastest, lowest = 0.0, np.inf
+    for i in range(n):
+        fastest = max(fastest, corners[i, 3])
+        lowest = min(lowest, corners[i, 2] - corners[i, 3] * time)
+    if fastest == 0.0:
+        return False
+    way = fastest * time
+    if not perspective:
+        if way * scale <= MARGIN_PX and (in_layers or lowest > near):
+            return False
+    else:
+        wide = np.sqrt(1.0 + half[0] ** 2 + half[1] ** 2)
+        normal = np.cross(corners[1, :3] - corners[0, :3], corners[2, :3] - corners[0, :3])
+        length = np.sqrt((normal**2).sum())
+        distance = abs((normal * corners[0, :3]).sum()) / length if length > 0.0 else 0.0
+        if distance > wide * wide * way * (scale / MARGIN_PX + 2.0):
+            return False
+    # out of sight throughout: all corners stay beyond one side
+    for plane in range(5):
+        steep = 1.0 if plane == 0 or not perspective else np.sqrt(1.0 + half[(plane - 1) // 2] ** 2)
+        furthest = -np.inf
+        for i in range(n):
+            furthest = max(furthest, _inside(corners[i], plane, half, near, perspective) + steep * corners[i, 3] * time)
+        if furthest < 0.0:
+            return False
+    return True
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _reverse(points: FloatArray, speeds: FloatArray, reach: FloatArray, outlined: BoolArray, n: int) -> None:
     """Turn a loop round; an edge's data move with the edge."""
     points[:] = points[::-1].copy()
     old_speeds, old_reach, old_flags = speeds.copy(), reach.copy(), outlined.copy()
@@ -353,8 +313,11 @@ def _reverse(points, speeds, reach, outlined, n):  # type: ignore[no-untyped-def
         outlined[i] = old_flags[j]
 
 
-@njit(cache=True, nogil=True)
-def _plane(camera, uv, spread, perspective, scale, cx, cy, out):  # type: ignore[no-untyped-def]
+@njit(cache=True, nogil=True, error_model="numpy")
+def _plane(
+    camera: FloatArray, uv: FloatArray, spread: IntArray, perspective: bool, scale: float, cx: float, cy: float,
+    out: FloatArray,
+) -> bool:  # fmt: skip
     """Fill the coefficients of nearness, u q, v q and q in the picture; return False for a face seen edge-on."""
     o = camera[spread[0]]
     e1 = camera[spread[1]] - o
@@ -390,8 +353,8 @@ def _plane(camera, uv, spread, perspective, scale, cx, cy, out):  # type: ignore
     return True
 
 
-@njit(cache=True, nogil=True)
-def _to_picture(a, b, c, scale, cx, cy, out):  # type: ignore[no-untyped-def]
+@njit(cache=True, nogil=True, error_model="numpy")
+def _to_picture(a: float, b: float, c: float, scale: float, cx: float, cy: float, out: FloatArray) -> None:
     out[0] = a / scale
     out[1] = -b / scale
     out[2] = c - a * cx / scale + b * cy / scale

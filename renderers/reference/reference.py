@@ -14,9 +14,9 @@ import numpy as np
 
 from aliasbench.renderers.frame import Frame
 from aliasbench.renderers.reference.cache import Stored, fetch
+from aliasbench.renderers.reference.faces import Faces, build_faces
 from aliasbench.renderers.reference.flat import Integral, draw_instant, draw_shutter
 from aliasbench.renderers.reference.paths import Paths, scene_paths
-from aliasbench.renderers.reference.pieces import Faces, build_faces
 from aliasbench.renderers.technique import Technique
 from aliasbench.scenes.errors import NotAvailableError
 from aliasbench.scenes.model import Scene, content_digest

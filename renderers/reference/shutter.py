@@ -1,25 +1,33 @@
 """A certified bound on the error of the shutter's time integral, from the middles of its slices alone.
 
-The picture is averaged over n slices of the open shutter, each shown as it is at its middle (composite midpoint). Within
-a slice a pixel changes only by what edges sweep over it: between the middle and a time s away an edge of (normal) speed v sweeps
-at most v s sqrt(2) of the pixel, so the slice's mean is off by at most the colour step times v h sqrt(2) / 4, and by
-nothing if no edge comes near. Where planes may pass through one another as they move, the line in which they meet has no
-bounded speed: such a pixel counts with the whole colour step. The sum over the slices bounds every pixel; rounding is
+The picture is averaged over n slices of the open shutter, each shown as it is at its middle (composite midpoint). In a
+slice a pixel changes only by what edges sweep over it: up to a time s from the middle, an edge of speed v across itself
+sweeps at most v s sqrt(2) of the pixel, so the slice's mean is off by at most the colour step times v h sqrt(2) / 4,
+and by nothing if no edge comes near. Where planes may pass through one another as they move, the line in which they
+meet has no bounded speed: such a pixel counts with the whole colour step. The sum over the slices bounds every pixel; rounding is
 far below.
 """
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
-from aliasbench.renderers.reference.coverage import TIE, row_extent
+from aliasbench.renderers.reference.coverage import row_extent
+from aliasbench.renderers.reference.slabs import TIE
+from aliasbench.scenes.model import FloatArray
+
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
 
 _SQRT2 = 1.4142135623730951
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def bound_edges(
-    points, speeds, reach, outlined, starts, owners, instants, contrasts, length, weight, rows, out
-):  # type: ignore[no-untyped-def]
+    points: FloatArray, speeds: FloatArray, reach: FloatArray, outlined: BoolArray, starts: IntArray,
+    owners: IntArray, instants: IntArray, contrasts: FloatArray, length: float, weight: float, rows: IntArray,
+    out: FloatArray,
+) -> None:  # fmt: skip
     """Add the slices' error bounds by moving outlines to rows [rows[0], rows[1]) of `out` (h, w).
 
     Parameters
@@ -67,8 +75,8 @@ def bound_edges(
                     out[row, column] += step * min(1.0, _SQRT2 / 4 * speed * length)
 
 
-@njit(cache=True, nogil=True)
-def _within(a, b, low, high):  # type: ignore[no-untyped-def]
+@njit(cache=True, nogil=True, error_model="numpy")
+def _within(a: float, b: float, low: float, high: float) -> tuple[float, float]:
     """Return the range of t in [0, 1] in which a + t (b - a) lies in [low, high], a little widened."""
     if abs(b - a) < 1e-9:
         return (0.0, 1.0) if a >= low - 1e-9 and a <= high + 1e-9 else (1.0, 0.0)
@@ -78,11 +86,12 @@ def _within(a, b, low, high):  # type: ignore[no-untyped-def]
     return max(0.0, t - 1e-9), min(1.0, u + 1e-9)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def bound_crossings(
-    points, reach, starts, planes, owners, instants, contrasts, kinds, turns, perspective, scale, center, extent,
-    length, weight, rows, out,
-):  # type: ignore[no-untyped-def]  # fmt: skip
+    points: FloatArray, reach: FloatArray, starts: IntArray, planes: FloatArray, owners: IntArray, instants: IntArray,
+    contrasts: FloatArray, kinds: IntArray, turns: FloatArray, perspective: bool, scale: float, center: FloatArray,
+    extent: float, length: float, weight: float, rows: IntArray, out: FloatArray,
+) -> None:  # fmt: skip
     """Add the slices' error bounds where planes may change their order, to rows of `out` (h, w).
 
     Parameters
@@ -132,10 +141,12 @@ def bound_crossings(
                         out[row, column] += weight * step * max(contrasts[owners[i]], contrasts[owners[j]])
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _crossing(
-    p, q, steep_p, steep_q, near_p, near_q, turn_p, turn_q, alike, perspective, scale, center, extent, length, x, y
-):  # type: ignore[no-untyped-def]  # fmt: skip
+    p: FloatArray, q: FloatArray, steep_p: float, steep_q: float, near_p: float, near_q: float, turn_p: float,
+    turn_q: float, alike: bool, perspective: bool, scale: float, center: FloatArray, extent: float, length: float,
+    x: int, y: int,
+) -> float:  # fmt: skip
     """Return the share of a pixel that may change sides between two planes, on average over a slice."""
     low, high, flat = np.inf, -np.inf, True
     rate_p, rate_q = 0.0, 0.0
@@ -155,8 +166,11 @@ def _crossing(
     return min(1.0, _SQRT2 / 2 * max(near_p, near_q)) if alike else 1.0
 
 
-@njit(cache=True, nogil=True)
-def _change(nearness, steep, near, turn, ray, perspective, scale, length):  # type: ignore[no-untyped-def]
+@njit(cache=True, nogil=True, error_model="numpy")
+def _change(
+    nearness: float, steep: float, near: float, turn: float, ray: float, perspective: bool, scale: float,
+    length: float,
+) -> float:  # fmt: skip
     """Return a bound on how much a plane's nearness at a fixed point changes within half a slice.
 
     A plane moving at V changes the depth along an axis at V / cos; half as much again covers what the tilt and the

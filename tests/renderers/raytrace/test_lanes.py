@@ -4,8 +4,18 @@ import numpy as np
 import pytest
 
 from aliasbench.renderers.raytrace.embree import Device, EmbreeError, TriangleScene, embree_info
-from aliasbench.renderers.raytrace.lanes import LANES, PX, PY, SCRATCH_SIZE, TIME, aligned_floats, build_sampling
-from aliasbench.renderers.raytrace.lanes import fill_keys, fill_positions, fill_times
+from aliasbench.renderers.raytrace.lanes import (
+    LANES,
+    PX,
+    PY,
+    SCRATCH_SIZE,
+    TIME,
+    aligned_floats,
+    build_sampling,
+    fill_keys,
+    fill_positions,
+    fill_times,
+)
 from aliasbench.renderers.raytrace.trig import cos_turns, sin_turns
 from aliasbench.renderers.sampling.hashing import frame_key
 from aliasbench.renderers.sampling.patterns import SAMPLERS, sample_set
@@ -67,7 +77,5 @@ def test_embree_errors_become_exceptions() -> None:
         empty = TriangleScene(device, np.zeros((0, 3), np.float32), np.zeros((0, 3), np.int32), robust=True)
         empty.close()
         empty.close()
-        lost = TriangleScene(
-            device, np.full((3, 3), np.nan, np.float32), np.array([[0, 1, 2]], np.int32), robust=False
-        )
+        lost = TriangleScene(device, np.full((3, 3), np.nan, np.float32), np.array([[0, 1, 2]], np.int32), robust=False)
         lost.close()

@@ -171,7 +171,5 @@ def test_a_body_squeezed_flat_is_no_crash(polygon: Any, flat_scene: Any) -> None
 def test_meshes_and_polygons_move_alike(polygon: Any, flat_scene: Any) -> None:
     body = polygon(CORNERS, motion=MOTIONS["spin"])
     mesh = dataclasses.replace(body, is_polygon=False, vertices=read_only(CORNERS.copy()))
-    pictures = [
-        render(flat_scene([s], animation=HALF_OPEN), "raytrace:spp=5", size=SIZE).pixels for s in (body, mesh)
-    ]
+    pictures = [render(flat_scene([s], animation=HALF_OPEN), "raytrace:spp=5", size=SIZE).pixels for s in (body, mesh)]
     np.testing.assert_array_equal(*pictures)

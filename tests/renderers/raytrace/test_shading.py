@@ -6,7 +6,17 @@ import numpy as np
 import pytest
 
 from aliasbench.renderers.catalog import render
-from aliasbench.scenes.model import Animation, Camera, Checker, Grating, ImageTexture, Motion, Texture, ZonePlate, read_only
+from aliasbench.scenes.model import (
+    Animation,
+    Camera,
+    Checker,
+    Grating,
+    ImageTexture,
+    Motion,
+    Texture,
+    ZonePlate,
+    read_only,
+)
 from aliasbench.scenes.motion import object_matrix
 from aliasbench.scenes.projection import view_at
 from aliasbench.scenes.textures import evaluate_point, mip_chain

@@ -64,9 +64,7 @@ def test_pixels_are_the_same_on_any_number_of_threads(
 
 
 @pytest.mark.parametrize("value", ["0", "-1", "two", "1.5", "1025"])
-def test_a_bad_number_of_threads_is_refused(
-    triangle_scene: Scene, monkeypatch: pytest.MonkeyPatch, value: str
-) -> None:
+def test_a_bad_number_of_threads_is_refused(triangle_scene: Scene, monkeypatch: pytest.MonkeyPatch, value: str) -> None:
     monkeypatch.setenv("ALIASBENCH_THREADS", value)
     with pytest.raises(InputError, match=rf"ALIASBENCH_THREADS={value}: must be a whole number from 1 to 1024"):
         prepare(triangle_scene, "raytrace:", size=(4, 4))

@@ -57,7 +57,10 @@ def test_rolled_perspective_checker_is_within_its_bound(make_polygon, make_scene
     floor = [(-1.0, 0.0, 1.0), (1.0, 0.0, 1.0), (1.0, 0.0, -1.0), (-1.0, 0.0, -1.0)]
     texture = Checker((6.0, 6.0), (0.1, 0.0, 0.0), (0.9, 0.8, 1.0))
     scene = make_scene(
-        [make_polygon(floor, (0.5, 1, 1), texture="c")], camera=camera, textures={"c": texture}, background=(0.2, 0.2, 0.2)
+        [make_polygon(floor, (0.5, 1, 1), texture="c")],
+        camera=camera,
+        textures={"c": texture},
+        background=(0.2, 0.2, 0.2),
     )
     size = (16, 12)
     frame = render(scene, "reference:", size=size)
@@ -72,7 +75,8 @@ def test_rolled_perspective_checker_is_within_its_bound(make_polygon, make_scene
     uv = np.stack([(hit[..., 0] + 1) / 2, (1 - hit[..., 2]) / 2], axis=-1)
     shown = np.where(inside[..., None], evaluate_point(texture, uv)[..., :3] * (0.5, 1, 1), 0.2)
     expected = shown.reshape(12, k, 16, k, 3).mean(axis=(1, 3))
-    assert frame.uncertainty is not None and frame.uncertainty < 5e-3
+    assert frame.uncertainty is not None
+    assert frame.uncertainty < 5e-3
     # the regular grid itself: a few edges in a pixel, each off by at most half a cell's share
     assert np.abs(frame.pixels - expected).max() <= frame.uncertainty + 3 * 0.5 / k
     assert np.sqrt(((frame.pixels - expected) ** 2).mean()) < 2e-3
@@ -89,7 +93,8 @@ def test_grating_has_the_box_filter_of_its_wave(make_polygon, make_scene, profil
     else:
         mean = 0.5 + 0.5 * dark_minus_light(2 * (3 * v + 0.1) + 0.5)
     expected = np.array([0.2, 0.2, 0.2]) + mean[:, None] * np.array([0.6, 0.5, 0.4])
-    assert frame.uncertainty is not None and frame.uncertainty < 1e-3
+    assert frame.uncertainty is not None
+    assert frame.uncertainty < 1e-3
     assert np.abs(frame.pixels - expected[:, None]).max() <= frame.uncertainty
 
 
@@ -104,7 +109,8 @@ def test_zone_plate_is_within_its_bound(make_polygon, make_scene):
     s, c = fresnel(x * scale)
     along = np.diff(c + 1j * s) / scale * 16
     expected = 0.5 + 0.5 * (np.exp(0.3j) * along[:, None] * along[None, :]).real
-    assert frame.uncertainty is not None and frame.uncertainty < 5e-3
+    assert frame.uncertainty is not None
+    assert frame.uncertainty < 5e-3
     assert np.abs(frame.pixels[..., 1] - expected).max() <= frame.uncertainty
 
 
@@ -116,7 +122,8 @@ def test_panned_checker_blurs_as_its_motion_says(make_polygon, make_scene):
     pan = Motion((4 * px * 30, 0.0, 0.0))
     scene = make_scene([make_polygon(wide, texture="c", motion=pan)], textures={"c": checker}, shutter=1.0)
     frame = render(scene, "reference:", size=(16, 16))
-    assert frame.uncertainty is not None and frame.uncertainty < 0.2
+    assert frame.uncertainty is not None
+    assert frame.uncertainty < 0.2
     assert np.abs(frame.pixels - 0.5).max() <= frame.uncertainty
 
 

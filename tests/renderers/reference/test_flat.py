@@ -33,9 +33,13 @@ coordinate = st.floats(-1.4, 1.4, allow_nan=False).map(lambda x: round(x, 4))
 
 
 @settings(max_examples=60, deadline=None, derandomize=True)
-@given(st.lists(st.tuples(coordinate, coordinate), min_size=3, max_size=3), st.tuples(st.integers(1, 9), st.integers(1, 9)))
+@given(
+    st.lists(st.tuples(coordinate, coordinate), min_size=3, max_size=3), st.tuples(st.integers(1, 9), st.integers(1, 9))
+)
 def test_triangle_covers_what_an_overlay_library_says(points, size):
-    scene = Scene("t", Camera("orthographic", height=2.0), (Surface(np.c_[points, np.zeros(3)], np.array([[0, 1, 2]], np.int32)),))
+    scene = Scene(
+        "t", Camera("orthographic", height=2.0), (Surface(np.c_[points, np.zeros(3)], np.array([[0, 1, 2]], np.int32)),)
+    )
     shape = shapely.Polygon(in_picture(scene, points, size))
     frame = render(scene, "reference:", size=size)
     # both round coordinates of up to some ten pixels: a few ulp of them times the edge in a pixel
@@ -78,7 +82,10 @@ def test_nearer_polygon_hides_whatever_the_order(make_polygon, make_scene, near_
 
 
 def test_later_of_coplanar_polygons_wins(make_polygon, make_scene):
-    first, second = [(-0.9, -0.9), (0.7, -0.9), (0.7, 0.7), (-0.9, 0.7)], [(-0.3, -0.2), (0.9, -0.2), (0.9, 0.9), (-0.3, 0.9)]
+    first, second = (
+        [(-0.9, -0.9), (0.7, -0.9), (0.7, 0.7), (-0.9, 0.7)],
+        [(-0.3, -0.2), (0.9, -0.2), (0.9, 0.9), (-0.3, 0.9)],
+    )
     scene = make_scene([make_polygon(first, (1, 0, 0)), make_polygon(second, (0, 1, 0))])
     size = (11, 11)
     above = shapely.Polygon(in_picture(scene, second, size))
@@ -90,7 +97,9 @@ def test_later_of_coplanar_polygons_wins(make_polygon, make_scene):
 
 @pytest.mark.parametrize("projection", ["orthographic", "perspective"])
 def test_planes_that_cross_meet_in_a_line(make_polygon, make_scene, projection):
-    camera = Camera("orthographic", height=2.0) if projection == "orthographic" else Camera("perspective", fov_y_deg=30.0)
+    camera = (
+        Camera("orthographic", height=2.0) if projection == "orthographic" else Camera("perspective", fov_y_deg=30.0)
+    )
     tilt = 0.7
     a = [(-2, -2, -2 * tilt), (2, -2, 2 * tilt), (2, 2, 2 * tilt), (-2, 2, -2 * tilt)]  # z = tilt x
     b = [(-2, -2, 0.1), (2, -2, 0.1), (2, 2, 0.1), (-2, 2, 0.1)]
@@ -140,7 +149,8 @@ def test_empty_scene_is_its_background(make_scene, size):
     assert frame.pixels.dtype == np.float64
     assert np.array_equal(frame.pixels, np.broadcast_to((0.1, 0.2, 0.7), (size[1], size[0], 3)))
     assert (frame.uncertainty_kind, frame.samples) == ("bound", 0)
-    assert frame.uncertainty is not None and frame.uncertainty < 1e-11
+    assert frame.uncertainty is not None
+    assert frame.uncertainty < 1e-11
 
 
 def test_seed_changes_nothing(make_polygon, make_scene):
@@ -154,8 +164,8 @@ def test_missing_features_are_named(make_polygon, make_scene):
     scene = make_scene([triangle])
     with pytest.raises(NotAvailableError, match=r"filter=tent of radius 1 is not available yet; available: filter=box"):
         render(scene, "reference:filter=tent", size=(4, 4))
+    camera = Camera("perspective", fov_y_deg=30.0, lens_radius=0.1)
     with pytest.raises(InputError, match="lens_radius"):
-        camera = Camera("perspective", fov_y_deg=30.0, lens_radius=0.1)
         render(make_scene([triangle], camera=camera), "reference:", size=(4, 4))
     glossy = Surface(triangle.vertices, triangle.triangles, material=Material("glossy"))
     with pytest.raises(NotAvailableError, match="material glossy"):
