@@ -5,8 +5,8 @@ and a second traversal), and interpolates in float32 between at most 129 poses; 
 needs no rebuilding between frames, and lets both engines trace the same rays. The price grows with the number of moving
 bodies that a pixel may see, hence each has the rectangle of the picture that it can reach.
 
-A body's point b lies at x = s R(t)(b + pivot) + a0 + a1 t relative to the anchor, t in [0, 1) over the shutter (spin and
-velocity), or at x = (M0 + t M1) b + a0 + a1 t (two matrices). s and part of a0, a1 bring higher layers nearer.
+A body's point b lies at x = s R(t)(b + pivot) + a0 + a1 t relative to the anchor, t in [0, 1) over the shutter (spin
+and velocity), or at x = (M0 + t M1) b + a0 + a1 t (two matrices). s and part of a0, a1 bring higher layers nearer.
 """
 
 from dataclasses import dataclass
@@ -20,7 +20,6 @@ from aliasbench.renderers.raytrace.lanes import (
     DX,
     DY,
     DZ,
-    HIT_GEOM,
     LANES,
     LX,
     LY,
@@ -245,7 +244,3 @@ def may_see(values: FloatArray, left: int, right: int, row: int) -> bool:
         and row + 1 >= values[BOUNDS + 2]
         and row <= values[BOUNDS + 3]
     )
-
-
-assert BODY_SIZE == BOUNDS + 4
-assert HIT_GEOM > RAY_TFAR

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from aliasbench.scenes.errors import NotAvailableError
 
-# Values of Embree's enums (rtcore_common.h, rtcore_device.h, rtcore_geometry.h, rtcore_scene.h; the same in all of 4.x).
+# Values of Embree's enums (rtcore_common.h, rtcore_device.h, rtcore_geometry.h, rtcore_scene.h), the same in 4.x.
 _GEOMETRY_TRIANGLE = 0
 _BUFFER_INDEX, _BUFFER_VERTEX = 0, 1
 _FORMAT_UINT3, _FORMAT_FLOAT3 = 0x5003, 0x9003

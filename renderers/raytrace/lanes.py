@@ -15,7 +15,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from aliasbench.renderers.sampling.hashing import SHARED, combine, pixel_key, unit
+from aliasbench.renderers.sampling.hashing import SHARED, combine, unit
 from aliasbench.renderers.sampling.patterns import (
     CENTER,
     DIM_X,
@@ -108,16 +108,22 @@ def _fill_cells(sampler: int, samples: int, cells: FloatArray) -> None:
 
 
 @njit(cache=True, error_model="numpy", _nrt=False)
-def fill_keys(pattern: Sampling, row: int, keys: KeyArray) -> None:
-    """Write the keys of a row's pixels (3, width): of the pattern, and of its x and y.
-
-    They are three hashes deep, a chain that costs less done for many pixels at once than on the way to each packet.
-    """
+def fill_columns(pattern: Sampling, keys: KeyArray) -> None:
+    """Write what the keys of a column's pixels start from, once for a picture: `keys` (4, width), last row."""
     for column in range(keys.shape[1]):
-        if pattern.shared:
-            key = pixel_key(pattern.start, SHARED, SHARED)
-        else:
-            key = pixel_key(pattern.start, column, row)
+        keys[3, column] = combine(pattern.start, SHARED if pattern.shared else column)
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def fill_keys(pattern: Sampling, row: int, keys: KeyArray) -> None:
+    """Write the keys of a row's pixels: `keys` (4, width) gets those of the pattern and of its x and y.
+
+    They are a chain of hashes, which costs less done for many pixels at once than on the way to each packet.
+    `hashing.pixel_key` is the definition.
+    """
+    value = SHARED if pattern.shared else row
+    for column in range(keys.shape[1]):
+        key = combine(keys[3, column], value)
         keys[0, column], keys[1, column], keys[2, column] = key, combine(key, DIM_X), combine(key, DIM_Y)
 
 
@@ -239,22 +245,38 @@ def add_samples(
 
     `sums` (3,) float64 carries the pixel that is not complete yet.
     """
-    column, index, lane = first // samples, first % samples, 0
-    r, g, b = sums[0], sums[1], sums[2]
+    column = first // samples
+    index = first - column * samples
+    if samples - index >= LANES:
+        # In groups of four: a single chain of sixteen additions would be waited for.
+        for k in range(3):
+            at = RED + k * LANES
+            total = sums[k]
+            for i in range(4):
+                total += (scratch[at + i] + scratch[at + i + 4]) + (scratch[at + i + 8] + scratch[at + i + 12])
+            sums[k] = total
+        if index + LANES == samples:
+            _write_pixel(samples, row, column, sums, out)
+        return
+    lane = 0
     while lane < lanes:
         run = min(lanes - lane, samples - index)
         for k in range(lane, lane + run):
-            r += scratch[RED + k]
-            g += scratch[GREEN + k]
-            b += scratch[BLUE + k]
+            sums[0] += scratch[RED + k]
+            sums[1] += scratch[GREEN + k]
+            sums[2] += scratch[BLUE + k]
         lane += run
         if index + run == samples:
-            out[row, column, 0] = np.float32(r / samples)
-            out[row, column, 1] = np.float32(g / samples)
-            out[row, column, 2] = np.float32(b / samples)
-            r, g, b = 0.0, 0.0, 0.0
+            _write_pixel(samples, row, column, sums, out)
         column, index = column + 1, 0
-    sums[0], sums[1], sums[2] = r, g, b
+
+
+@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+def _write_pixel(samples: int, row: int, column: int, sums: FloatArray, out: NDArray[np.float32]) -> None:
+    """Write the mean of a pixel's samples, and start the sums of the next."""
+    for k in range(3):
+        out[row, column, k] = np.float32(sums[k] / samples)
+        sums[k] = 0.0
 
 
 def aligned_floats(count: int) -> NDArray[np.float32]:

@@ -31,6 +31,7 @@ from aliasbench.renderers.raytrace.lanes import (
     Sampling,
     add_samples,
     aligned_floats,
+    fill_columns,
     fill_keys,
     fill_moving_rays,
     fill_positions,
@@ -101,7 +102,7 @@ def make_workspace(width: int) -> Workspace:
         arguments,
         np.zeros(LANES, np.int32),
         np.zeros(3),
-        np.zeros((3, width), np.uint64),
+        np.zeros((4, width), np.uint64),
     )
 
 
@@ -141,10 +142,11 @@ def _trace_bodies(scenes: NDArray[np.int64], tables: Tables, work: Workspace, ro
 
 @njit(nogil=True, cache=True, error_model="numpy", _nrt=False)
 def render_static_flat(
-    scene: int, scenes: NDArray[np.int64], camera: FloatArray, pattern: Sampling, tables: Tables, work: Workspace,
+    scene: int, camera: FloatArray, pattern: Sampling, tables: Tables, work: Workspace,
     counter: NDArray[np.int64], out: NDArray[np.float32],
 ) -> None:  # fmt: skip
     """Render rows until there are none left: nothing moves, no textures."""
+    fill_columns(pattern, work.keys)
     while True:
         row = _take_next(counter)
         if row >= out.shape[0]:
@@ -162,10 +164,11 @@ def render_static_flat(
 
 @njit(nogil=True, cache=True, error_model="numpy", _nrt=False)
 def render_static_textured(
-    scene: int, scenes: NDArray[np.int64], camera: FloatArray, pattern: Sampling, tables: Tables, work: Workspace,
+    scene: int, camera: FloatArray, pattern: Sampling, tables: Tables, work: Workspace,
     counter: NDArray[np.int64], out: NDArray[np.float32],
 ) -> None:  # fmt: skip
     """Render rows until there are none left: nothing moves."""
+    fill_columns(pattern, work.keys)
     while True:
         row = _take_next(counter)
         if row >= out.shape[0]:
@@ -188,6 +191,7 @@ def render_moving(
 ) -> None:  # fmt: skip
     """Render rows until there are none left: every sample has a time of its own."""
     textured = len(tables.triangles) > 0
+    fill_columns(pattern, work.keys)
     while True:
         row = _take_next(counter)
         if row >= out.shape[0]:
@@ -206,15 +210,6 @@ def render_moving(
             else:
                 shade_flat(tables, work.hits, work.scratch)
             add_samples(pattern.samples, row, first, lanes, work.scratch, work.sums, out)
-
-
-def pick_kernel(*, moving: bool, textured: bool) -> Kernel:
-    """Return the narrowest kernel that does what a scene needs."""
-    if moving:
-        kernel: Kernel = render_moving
-    else:
-        kernel = render_static_textured if textured else render_static_flat
-    return kernel
 
 
 def run_kernel(
@@ -271,9 +266,15 @@ class PacketEngine:
         """Write the picture (h, w, 3)."""
         if self._still is None:
             raise InputError("this renderer has been closed")
-        kernel = pick_kernel(moving=moving, textured=len(tables.triangles) > 0)
+        shared: tuple[object, ...] = (camera, pattern, tables)
+        if moving:
+            kernel, arguments = render_moving, (self._still.handle, self._handles, *shared)
+        else:
+            textured = len(tables.triangles) > 0
+            kernel = render_static_textured if textured else render_static_flat
+            arguments = (self._still.handle, *shared)
         workspaces = [make_workspace(out.shape[1]) for _ in range(min(self._threads, len(out)))]
-        run_kernel(kernel, self._pool, workspaces, (self._still.handle, self._handles, camera, pattern, tables), out)
+        run_kernel(kernel, self._pool, workspaces, arguments, out)
 
     def close(self) -> None:
         """Free everything (again is harmless)."""

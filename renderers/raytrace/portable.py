@@ -23,6 +23,7 @@ from aliasbench.renderers.raytrace.lanes import (
     KeyArray,
     Sampling,
     add_samples,
+    fill_columns,
     fill_keys,
     fill_moving_rays,
     fill_positions,
@@ -48,7 +49,7 @@ class PortableEngine:
         self._robust = robust
         self._is_closed = False
         self._still: EmbreeScene | None = None
-        self._bodies: list[EmbreeScene] = []
+        self._bodies: list[EmbreeScene | None] = []
 
     def _build(self, mesh: Mesh) -> EmbreeScene | None:
         if not len(mesh.triangles):
@@ -73,7 +74,8 @@ class PortableEngine:
         rows = max(1, _BATCH // per_row)
         scratch = np.zeros((rows * per_row, SCRATCH_SIZE))
         rays = np.zeros((rows * per_row, RAY_SIZE), np.float32)
-        keys, sums = np.zeros((3, out.shape[1]), np.uint64), np.zeros(3)
+        keys, sums = np.zeros((4, out.shape[1]), np.uint64), np.zeros(3)
+        fill_columns(pattern, keys)
         for top in range(0, out.shape[0], rows):
             blocks = min(rows, out.shape[0] - top) * per_row
             _make_rays(camera, pattern, moving, top, keys, scratch[:blocks], rays[:blocks])
@@ -87,6 +89,8 @@ class PortableEngine:
         if self._still is not None:
             self._nearer(self._still, rays, 0, nearest, hits)
         for index, body in enumerate(self._bodies):
+            if body is None:
+                continue
             _make_body_rays(tables.bodies[index], scratch, rays)
             self._nearer(body, rays, int(tables.firsts[index]), nearest, hits)
         return hits.reshape(-1, LANES)

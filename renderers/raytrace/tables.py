@@ -64,7 +64,7 @@ _CHAIN_KIND = {"point": NEAREST, "linear": TRILINEAR, "mipmap": MIPMAP, "triline
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Mesh:
-    """Triangles in one frame of reference: `vertices` (n, 3) float64, `triangles` (m, 3), `uv` (n, 2), `owners` (m,)."""
+    """Triangles (m, 3) in one frame of reference, over vertices (n, 3) float64, uv (n, 2); and owners (m,)."""
 
     vertices: FloatArray
     triangles: NDArray[np.int32]
@@ -207,7 +207,7 @@ def _put_analytic(values: FloatArray, texture: Texture) -> None:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Ownership:
-    """Of some triangles in a row: whose they are (m,), and their values (m, TRIANGLE_SIZE), or none without textures."""
+    """Of triangles in a row: whose they are (m,), and their values (m, TRIANGLE_SIZE), or none without textures."""
 
     owners: NDArray[np.int32]
     values: FloatArray

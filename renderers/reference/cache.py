@@ -2,8 +2,8 @@
 
 The key is a hash of everything that enters a reference: the scene's content, the size, the frame, the technique's
 fields that a reference knows, and the version of the algorithm. A file carries a checksum of its data, so that a
-damaged or half-written one is made anew; it appears under its name at once (renamed when whole), so two writers are safe. A
-cache that cannot be written costs time, not correctness.
+damaged or half-written one is made anew; it gets its name when it is whole, so two writers are safe. A cache that
+cannot be written costs time, not correctness.
 """
 
 import contextlib

@@ -114,7 +114,9 @@ def converge(
     """
     table = texture_table(scene, linear=linear)
     times = _TIMES if spread else 1
-    lines = int(np.clip(_LINES * 65536 / (size[0] * size[1]), 8, 512))
+    # an analytic texture has few squares or none: a line is cheap
+    dear = any(isinstance(t, ImageTexture) for t in scene.textures.values())
+    lines = int(np.clip(_LINES * (1 if dear else 4) * 65536 / (size[0] * size[1]), 8, 512))
     mean, spread_sum = np.zeros((size[1], size[0], 3)), np.zeros((size[1], size[0], 3))
     for replicate in range(REPLICATES):
         picture = _replicate(scene, faces, paths, size, frame, table, times, max(1, lines // times), replicate)

@@ -2,8 +2,8 @@
 
 Faces (outlines of convex polygons, else triangles) are taken to camera space, cut by the near plane and by the border
 of the picture with a margin, and projected. Cutting before the division keeps coordinates small, so a plane that runs
-behind the camera loses no digits. Everything that neighbours share is computed from the same numbers in the same order, whichever
-face asks: shared edges stay shared to the last bit, and parts of a plane leave no gap.
+behind the camera loses no digits. Everything that neighbours share is computed from the same numbers in the same
+order, whichever face asks: shared edges stay shared to the last bit, and parts of a plane leave no gap.
 
 Nearness (minus the depth, or 1 / depth under perspective) and texture coordinates (times nearness) are affine in the
 picture, three coefficients each.
@@ -22,6 +22,7 @@ from aliasbench.scenes.projection import View
 
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
+Triple = tuple[float, float, float]
 
 MARGIN_PX = 4.0  # scenes go on outside the picture; the shutter's bound needs room for what comes in during a slice
 _NEAR = 1e-9  # relative to the largest camera coordinate
@@ -285,9 +286,9 @@ def _may_come_in(
             return False
     else:
         wide = np.sqrt(1.0 + half[0] ** 2 + half[1] ** 2)
-        normal = np.cross(corners[1, :3] - corners[0, :3], corners[2, :3] - corners[0, :3])
-        length = np.sqrt((normal**2).sum())
-        distance = abs((normal * corners[0, :3]).sum()) / length if length > 0.0 else 0.0
+        normal = _cross(_minus(corners[1], corners[0]), _minus(corners[2], corners[0]))
+        length = np.sqrt(_dot(normal, normal))
+        distance = abs(_dot(normal, corners[0])) / length if length > 0.0 else 0.0
         if distance > wide * wide * way * (scale / MARGIN_PX + 2.0):
             return False
     # out of sight throughout: all corners stay beyond one side
@@ -304,13 +305,35 @@ def _may_come_in(
 @njit(cache=True, nogil=True, error_model="numpy")
 def _reverse(points: FloatArray, speeds: FloatArray, reach: FloatArray, outlined: BoolArray, n: int) -> None:
     """Turn a loop round; an edge's data move with the edge."""
-    points[:] = points[::-1].copy()
-    old_speeds, old_reach, old_flags = speeds.copy(), reach.copy(), outlined.copy()
+    for i in range(n // 2):
+        j = n - 1 - i
+        for c in range(2):
+            points[i, c], points[j, c] = points[j, c], points[i, c]
+    # edge i now ends where it began: edge n - 2 - i of before, and the closing edge stays the last
+    for i in range(n - 1):
+        j = n - 2 - i
+        if i < j:
+            reach[i], reach[j] = reach[j], reach[i]
+            outlined[i], outlined[j] = outlined[j], outlined[i]
+            for c in range(2):
+                speeds[i, c], speeds[j, c] = speeds[j, c], speeds[i, c]
     for i in range(n):
-        j = (2 * n - 2 - i) % n
-        speeds[i, 0], speeds[i, 1] = old_speeds[j, 1], old_speeds[j, 0]
-        reach[i] = old_reach[j]
-        outlined[i] = old_flags[j]
+        speeds[i, 0], speeds[i, 1] = speeds[i, 1], speeds[i, 0]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _minus(a: FloatArray, b: FloatArray) -> Triple:
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _cross(a: Triple, b: Triple) -> Triple:
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _dot(a: Triple, b: Triple | FloatArray) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -320,11 +343,9 @@ def _plane(
 ) -> bool:  # fmt: skip
     """Fill the coefficients of nearness, u q, v q and q in the picture; return False for a face seen edge-on."""
     o = camera[spread[0]]
-    e1 = camera[spread[1]] - o
-    e2 = camera[spread[2]] - o
-    n = np.cross(e1, e2)
-    squared = n[0] ** 2 + n[1] ** 2 + n[2] ** 2
-    d = n[0] * o[0] + n[1] * o[1] + n[2] * o[2]
+    e1, e2 = _minus(camera[spread[1]], o), _minus(camera[spread[2]], o)
+    n = _cross(e1, e2)
+    squared, d = _dot(n, n), _dot(n, o)
     lead = d if perspective else n[2]
     if squared == 0.0 or lead == 0.0:
         return False
@@ -334,12 +355,12 @@ def _plane(
     else:
         near_x, near_y, near_1 = n[0] / n[2], n[1] / n[2], -d / n[2]
     _to_picture(near_x, near_y, near_1, scale, cx, cy, out[0])
-    g1 = np.cross(e2, n)
-    g2 = np.cross(n, e1)
+    g1, g2 = _cross(e2, n), _cross(n, e1)
     for c in range(2):
         t0, t1, t2 = uv[spread[0], c], uv[spread[1], c], uv[spread[2], c]
-        g = ((t1 - t0) * g1 + (t2 - t0) * g2) / squared
-        rest = t0 - (g[0] * o[0] + g[1] * o[1] + g[2] * o[2])
+        s1, s2 = (t1 - t0) / squared, (t2 - t0) / squared
+        g = (s1 * g1[0] + s2 * g2[0], s1 * g1[1] + s2 * g2[1], s1 * g1[2] + s2 * g2[2])
+        rest = t0 - _dot(g, o)
         if perspective:
             # u q = (g . q (X, Y, 1) z) q / z ... with P = (X, Y, 1) / q: u q = g . (X, Y, 1) + rest q
             _to_picture(g[0] + rest * near_x, g[1] + rest * near_y, g[2] + rest * near_1, scale, cx, cy, out[1 + c])

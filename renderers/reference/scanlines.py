@@ -17,7 +17,7 @@ from aliasbench.scenes.model import FloatArray
 
 IntArray = NDArray[np.int64]
 
-_MOST_LINES = 16  # times the asked-for number, in rows that texels crowd
+_MOST_LINES = 8  # times the asked-for number, in rows that texels crowd
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -76,7 +76,7 @@ def scan_rows(
                         shift = 0.5 if kinds[owner] == BILINEAR else 0.0
                         for axis in range(2):
                             m, asked = _level_lines(planes[ids[a]], maps[owner, axis], shift, row, width, knots, m)
-                            here = max(here, min(4 * asked, _MOST_LINES * lines))
+                            here = max(here, min(2 * asked, _MOST_LINES * lines))
             sort_prefix(knots, m)
             index = 0
             for k in range(1, m):

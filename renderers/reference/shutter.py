@@ -4,8 +4,8 @@ The picture is averaged over n slices of the open shutter, each shown as it is a
 slice a pixel changes only by what edges sweep over it: up to a time s from the middle, an edge of speed v across itself
 sweeps at most v s sqrt(2) of the pixel, so the slice's mean is off by at most the colour step times v h sqrt(2) / 4,
 and by nothing if no edge comes near. Where planes may pass through one another as they move, the line in which they
-meet has no bounded speed: such a pixel counts with the whole colour step. The sum over the slices bounds every pixel; rounding is
-far below.
+meet has no bounded speed: such a pixel counts with the whole colour step. The sum over the slices bounds every pixel;
+rounding is far below.
 """
 
 import numpy as np

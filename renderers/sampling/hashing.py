@@ -20,19 +20,18 @@ SHARED = -1
 
 
 @njit(inline="always", cache=True)
-def mix32(x: int) -> int:
+def mix32(x: int) -> np.uint64:
     """Return a bijective scramble of the low 32 bits, as uint64."""
-    x = np.uint64(x) & MASK
-    x ^= x >> _S16
-    x = (x * _MULTIPLIER_1) & MASK
-    x ^= x >> _S15
-    x = (x * _MULTIPLIER_2) & MASK
-    x ^= x >> _S16
-    return x
+    h = np.uint64(x) & MASK
+    h ^= h >> _S16
+    h = (h * _MULTIPLIER_1) & MASK
+    h ^= h >> _S15
+    h = (h * _MULTIPLIER_2) & MASK
+    return h ^ (h >> _S16)
 
 
 @njit(inline="always", cache=True)
-def combine(key: int, value: int) -> int:
+def combine(key: int, value: int) -> np.uint64:
     """Return the hash of a key extended by one more integer (negative ones wrap)."""
     return mix32((np.uint64(key) + _GOLDEN + (mix32(np.uint64(np.int64(value)) & MASK) ^ np.uint64(0x5BF03635))) & MASK)
 
@@ -44,19 +43,19 @@ def unit(key: int, index: int) -> float:
 
 
 @njit(inline="always", cache=True)
-def frame_key(seed: int, frame: int) -> int:
+def frame_key(seed: int, frame: int) -> np.uint64:
     """Return what the keys of all patterns of one frame start from."""
     return combine(combine(combine(0x243F6A88, seed & 0xFFFFFFFF), seed >> 32), frame)
 
 
 @njit(inline="always", cache=True)
-def pixel_key(start: int, column: int, row: int) -> int:
+def pixel_key(start: int, column: int, row: int) -> np.uint64:
     """Return the key of one pixel's pattern from its frame's; `column = row = SHARED` for that of all pixels."""
     return combine(combine(start, column), row)
 
 
 @njit(cache=True)
-def pattern_key(seed: int, frame: int, column: int, row: int) -> int:
+def pattern_key(seed: int, frame: int, column: int, row: int) -> np.uint64:
     """Return the key of one pixel's pattern; `column = row = SHARED` for the pattern of all pixels."""
     return pixel_key(frame_key(seed, frame), column, row)
 

@@ -12,6 +12,7 @@ from aliasbench.renderers.raytrace.lanes import (
     TIME,
     aligned_floats,
     build_sampling,
+    fill_columns,
     fill_keys,
     fill_positions,
     fill_times,
@@ -27,7 +28,8 @@ from aliasbench.renderers.sampling.patterns import SAMPLERS, sample_set
 def test_packets_hold_the_samples_of_the_shared_definition(name: str, count: int, shared: bool) -> None:
     pattern = build_sampling(name, count, frame_key(11, 4), shared=shared)
     width, row = 5, 9
-    keys = np.zeros((3, width), np.uint64)
+    keys = np.zeros((4, width), np.uint64)
+    fill_columns(pattern, keys)
     fill_keys(pattern, row, keys)
     got = []
     for start in range(0, width * count, LANES):
@@ -40,7 +42,7 @@ def test_packets_hold_the_samples_of_the_shared_definition(name: str, count: int
     for column in range(width):
         pixel = {} if shared else {"pixel": (column, row)}
         places = sample_set(name, count, seed=11, frame=4, **pixel)[:, :3]
-        expected.append(places + [column, row, 0.0])
+        expected.append(places + np.array([column, row, 0.0]))
     # The cells are a table here: position = corner + size * u rounds differently by an ulp.
     np.testing.assert_allclose(np.concatenate(got), np.concatenate(expected), rtol=0, atol=4e-15)
 

@@ -147,8 +147,8 @@ def test_one_fixed_sample_is_at_the_middle_of_the_shutter(polygon: Any, flat_sce
 def test_frames_do_not_depend_on_the_frames_before(polygon: Any, flat_scene: Any) -> None:
     # The camera flies far past its target, so that the origin of float32 coordinates changes on the way.
     camera = dataclasses.replace(PERSPECTIVE, velocity=(200.0, 0.0, 0.0), target_velocity=(0.0, 0.0, 0.0))
-    scene = flat_scene([polygon(CORNERS), polygon(CORNERS + [0, 0, 1], motion=MOTIONS["velocity"])], camera=camera,
-                       animation=HALF_OPEN)  # fmt: skip
+    above = polygon(CORNERS + np.array([0, 0, 1]), motion=MOTIONS["velocity"])
+    scene = flat_scene([polygon(CORNERS), above], camera=camera, animation=HALF_OPEN)
     with prepare(scene, "raytrace:spp=4", size=SIZE) as prepared:
         forward = [prepared.render(n).pixels for n in range(6)]
         backward = [prepared.render(n).pixels for n in reversed(range(6))][::-1]

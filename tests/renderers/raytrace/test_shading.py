@@ -34,7 +34,7 @@ TEXTURES: dict[str, Texture] = {
 
 
 def hit_uv(motion: Motion, animation: Animation, frame: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return (h, w, 2) texture coordinates at pixel centres on the floor z = 0 spanned by uv, and where they are on it."""
+    """Return (h, w, 2) texture coordinates at pixel centres on the plane of the floor, and which are on the floor."""
     view = view_at(CAMERA, animation, frame, 0.0, SIZE)
     x, y = np.meshgrid(np.arange(SIZE[0]) + 0.5, np.arange(SIZE[1]) + 0.5)
     origin, direction = view.ray(x, y)
