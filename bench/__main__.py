@@ -1,7 +1,5 @@
-"""`python -m aliasbench.bench`: the command line, where the script is not on the path."""
-
-import sys
+"""Runs the command line as `python -m aliasbench.bench`, where no script is installed."""
 
 from aliasbench.bench.cli import main
 
-sys.exit(main())
+raise SystemExit(main())

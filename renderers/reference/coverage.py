@@ -39,24 +39,30 @@ def cover_rows(
     for t in range(len(weights)):
         first, last = instants[t], instants[t + 1]
         low, high = np.empty(last - first), np.empty(last - first)
+        band = np.empty(last - first, np.int64)
+        here = 0
         for i in range(first, last):
-            ys = points[starts[i] : starts[i + 1], 1]
-            low[i - first], high[i - first] = ys.min(), ys.max()
+            top, bottom = np.inf, -np.inf
+            for k in range(starts[i], starts[i + 1]):
+                top, bottom = min(top, points[k, 1]), max(bottom, points[k, 1])
+            if top < rows[1] and bottom > rows[0]:
+                band[here], low[here], high[here] = i, top, bottom
+                here += 1
         for row in range(rows[0], rows[1]):
             n = 0
-            for i in range(last - first):
+            for i in range(here):
                 if low[i] < row + 1 and high[i] > row:
                     n += 1
             ids = np.empty(n, np.int64)
             left, right = np.empty(n), np.empty(n)
             solid = np.empty((n, 2))
             n = 0
-            for i in range(last - first):
+            for i in range(here):
                 if low[i] < row + 1 and high[i] > row:
-                    lo, hi = row_extent(points, starts[first + i], starts[first + i + 1], row, row + 1)
+                    lo, hi = row_extent(points, starts[band[i]], starts[band[i] + 1], row, row + 1)
                     if lo < width and hi > 0:
-                        ids[n], left[n], right[n] = first + i, lo, hi
-                        solid[n] = _solid_extent(points, starts[first + i], starts[first + i + 1], row)
+                        ids[n], left[n], right[n] = band[i], lo, hi
+                        solid[n] = _solid_extent(points, starts[band[i]], starts[band[i] + 1], row)
                         n += 1
             order = np.argsort(left[:n])
             active = np.empty(n, np.int64)

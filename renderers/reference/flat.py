@@ -24,7 +24,7 @@ _MOST_SLICES = 8192
 _CHUNK = 32
 _BAND = 16
 # Prices in nanoseconds, measured; they choose the number of slices, so they are constants and not clocks.
-_PIXEL_COST, _CELL_COST, _BUDGET = 12.0, 900.0, 4e9
+_PIXEL_COST, _CELL_COST, _FACE_COST, _BUDGET = 12.0, 900.0, 1500.0, 4e9
 
 Answer = TypeVar("Answer")
 
@@ -92,7 +92,7 @@ def draw_shutter(
     The number of slices follows from the bound of a few slices (it falls as 1 / n), within a fixed amount of work.
     """
     pilot, work = draw_slices(scene, faces, paths, size, frame, _PILOT)
-    price = size[0] * size[1] * _PIXEL_COST + work / _PILOT * _CELL_COST
+    price = size[0] * size[1] * _PIXEL_COST + work / _PILOT * _CELL_COST + len(faces.owners) * _FACE_COST
     affordable = min(_MOST_SLICES, int(_BUDGET / price))
     needed = int(np.ceil(_PILOT * float(pilot.bound.max()) / target * 1.05))
     count = max(_PILOT, min(needed, affordable))
@@ -108,7 +108,7 @@ def draw_slices(
     colors = palette(scene)
     contrasts = np.array([np.abs(colors - c).max() for c in colors[:-1]])
     kinds, turns = _kinds_and_turns(scene, paths, frame)
-    layered = is_layered(scene, paths, frame)
+    layered = is_layered(scene, faces, paths, frame)
     extent = scene_extent(scene)
     span = float((colors.max(axis=0) - colors.min(axis=0)).max())
     pixels, bound = np.zeros((size[1], size[0], 3)), np.zeros((size[1], size[0]))
@@ -154,17 +154,21 @@ def _kinds_and_turns(scene: Scene, paths: Paths, frame: int) -> tuple[NDArray[np
     return kinds, turns
 
 
-def is_layered(scene: Scene, paths: Paths, frame: int) -> bool:
-    """Return whether every object stays at one depth of its own: then no two can change their order."""
+def is_layered(scene: Scene, faces: Faces, paths: Paths, frame: int) -> bool:
+    """Return whether every face stays at one depth of its own: then no two can change their order."""
     camera = scene.camera
     if camera.projection != "orthographic" or paths.camera_turn(frame) > 0.0:
         return False
     forward = np.asarray(camera.target, dtype=np.float64) - np.asarray(camera.position)
     forward = forward / np.linalg.norm(forward)
     close = 1e-12 * scene_extent(scene)
-    for surface, motion in zip(scene.objects, paths.motions, strict=True):
-        depth = (surface.vertices - surface.vertices[:1]) @ forward
-        if np.abs(depth).max(initial=0.0) > close or motion.matrices is not None:
+    if len(faces.owners):
+        depth = (faces.vertices @ forward)[faces.corners]
+        deepest, nearest = (f.reduceat(depth, faces.starts[:-1]) for f in (np.maximum, np.minimum))
+        if (deepest - nearest).max() > close:
+            return False
+    for motion in paths.motions:
+        if motion.matrices is not None:
             return False
         if abs(float((np.asarray(motion.velocity) - np.asarray(camera.velocity)) @ forward)) > 0.0:
             return False

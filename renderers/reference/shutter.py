@@ -118,7 +118,7 @@ def bound_crossings(
         left, right = np.empty(n), np.empty(n)
         for row in range(rows[0], rows[1]):
             for a in range(n):
-                left[a], right[a] = 1.0, 0.0
+                left[a], right[a] = np.inf, -np.inf
                 if low[a] < row + 1 and high[a] > row:
                     i = instants[t] + a
                     if not near[a] < 4.0:
@@ -126,8 +126,12 @@ def bound_crossings(
                     else:
                         lo, hi = row_extent(points, starts[i], starts[i + 1], row - near[a], row + 1 + near[a])
                         left[a], right[a] = lo - near[a], hi + near[a]
-            for a in range(n):
-                for b in range(a):
+            order = np.argsort(left)
+            for first in range(n):
+                for second in range(first + 1, n):
+                    a, b = order[first], order[second]
+                    if left[b] >= right[a]:
+                        break
                     i, j = instants[t] + a, instants[t] + b
                     begin, end = max(left[a], left[b], 0.0), min(right[a], right[b], float(width))
                     if begin >= end or (near[a] <= 1e-9 and near[b] <= 1e-9):
