@@ -168,11 +168,13 @@ def _print_table(run_dir: Path) -> None:
     from rich.console import Console
 
     from aliasbench.bench.export import load_run
-    from aliasbench.bench.table import failure_lines, record_table
+    from aliasbench.bench.table import failure_lines, record_tables
 
     run = load_run(run_dir)
-    width = None if sys.stdout.isatty() else 200
-    Console(width=width, highlight=False).print(record_table(run))
+    width = None if sys.stdout.isatty() else 140
+    console = Console(width=width, highlight=False)
+    for table in record_tables(run, console.width):
+        console.print(table)
     for line in failure_lines(run):
         print(line)
     counts = {s: sum(r["status"] == s for r in run["records"]) for s in ("ok", "failed", "unsupported")}

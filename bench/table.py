@@ -1,6 +1,7 @@
 """The records as a table for the terminal: what a reader wants to know first, and every warning and reason in words."""
 
 from collections.abc import Sequence
+from itertools import groupby
 from typing import TYPE_CHECKING
 
 from aliasbench.bench.export import Record, Run
@@ -10,40 +11,48 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 NEGLIGIBLE = 1e-9  # what is left of a zero in float64
+DASH = "–"
+WIDE = 110  # characters from which there is room for everything
 HEADLINES = ("rmse", "jaggies", "shimmer", "moire", "strobing", "apparent_rate")
+SHORT = {"apparent_rate": "rev/s"}
 
 
-def record_table(run: Run) -> "Table":
-    """Return a table of all records, scene after scene: time with its interval, headline metrics, status, warnings.
+def record_tables(run: Run, width: int) -> list["Table"]:
+    """Return a table for each scene: time with its interval, the headline metrics it has, and what to beware of.
 
-    Only the headline metrics that some record has are shown; a dash is a metric without a value for this scene.
+    A dash is a metric without a value for this record; "< x" one that is under the reference's floor x. Where `width`,
+    in characters, is small, intervals and notes make way and a doubtful time is marked with ~.
     """
     from rich import box
     from rich.table import Table
     from rich.text import Text
 
-    records = run["records"]
-    names = [n for n in HEADLINES if any(_value(r, n) is not None for r in records)]
-    table = Table(box=box.SIMPLE_HEAD, title=f"{run['suite']}: {len(records)} cases", title_justify="left")
-    table.add_column("scene", overflow="fold")
-    table.add_column("technique", overflow="fold")
-    table.add_column("ms (95 %)", justify="right", no_wrap=True)
-    for name in names:
-        table.add_column(name, justify="right", no_wrap=True)
-    table.add_column("status")
-    table.add_column("notes")
+    tables = []
     styles = {"failed": "red", "unsupported": "yellow"}
-    for number, record in enumerate(records):
-        following = records[number + 1] if number + 1 < len(records) else record
-        time, warnings = _time(record["seconds"])
-        cells = [record["scene"], record["technique"], time, *(_number(_value(record, name)) for name in names)]
-        table.add_row(
-            *map(Text, cells),
-            Text(record["status"], styles.get(record["status"], "")),
-            Text("; ".join(warnings)),
-            end_section=following["scene"] != record["scene"],
-        )
-    return table
+    wide = width >= WIDE
+    for (scene, size), group in groupby(run["records"], key=lambda r: (r["scene"], tuple(r["size"]))):
+        records = list(group)
+        names = [n for n in HEADLINES if any(_number(r, n) != DASH for r in records)]
+        title = Text(f"{scene}  {size[0]} x {size[1]}", "bold")
+        table = Table(box=box.SIMPLE_HEAD, title=title, title_justify="left", pad_edge=False, padding=(0, 1, 0, 0))
+        longest = max(len(r["technique"]) for r in records)
+        table.add_column("technique", overflow="fold", min_width=min(longest, 24))
+        table.add_column("ms", justify="right", no_wrap=True)
+        if wide:
+            table.add_column("95 %", no_wrap=True)
+        for name in names:
+            table.add_column(SHORT.get(name, name), justify="right", no_wrap=True)
+        if wide:
+            table.add_column("notes", style="dim")
+        for record in records:
+            median, interval, warnings = _time(record["seconds"])
+            cells = [median, interval] if wide else [f"~{median}" if warnings else median]
+            cells += [_number(record, name) for name in names]
+            if wide:
+                cells.append("; ".join([*([] if record["status"] == "ok" else [record["status"]]), *warnings]))
+            table.add_row(Text(record["technique"], styles.get(record["status"], "")), *map(Text, cells))
+        tables.append(table)
+    return tables
 
 
 def failure_lines(run: Run) -> list[str]:
@@ -56,20 +65,22 @@ def failure_lines(run: Run) -> list[str]:
     return [f"{reason}\n    {', '.join(cases)}" for reason, cases in reasons.items()]
 
 
-def _time(seconds: Sequence[float]) -> tuple[str, list[str]]:
+def _time(seconds: Sequence[float]) -> tuple[str, str, list[str]]:
+    """Return the median in milliseconds, its interval, and warnings, as text."""
     if not seconds:
-        return "–", []
+        return DASH, "", []
     times = summarise(seconds)
     median, low, high = (f"{value * 1e3:.3g}" for value in (times.median_s, times.low_s, times.high_s))
-    return f"{median} ({low} to {high})", list(times.warnings)
+    return median, f"{low} to {high}", list(times.warnings)
 
 
-def _value(record: Record, name: str) -> float | None:
-    value = record["metrics"].get(name, {}).get("value")
-    return value if isinstance(value, float) else None
-
-
-def _number(value: float | None) -> str:
-    if value is None:
-        return "–"
-    return f"{value:.4g}" if abs(value) >= NEGLIGIBLE else "0"
+def _number(record: Record, name: str) -> str:
+    score = record["metrics"].get(name)
+    if score is None:
+        return DASH
+    value = score["value"]
+    if isinstance(value, float):
+        return f"{value:.4g}" if abs(value) >= NEGLIGIBLE else "0"
+    extras = score["extras"]
+    floor = extras.get("floor") if score["status"] == "below_reference_floor" and isinstance(extras, dict) else None
+    return f"< {floor:.2g}" if isinstance(floor, float) else DASH

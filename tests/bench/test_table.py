@@ -7,7 +7,7 @@ import pytest
 from rich.console import Console
 
 from aliasbench.bench.export import Record, Run
-from aliasbench.bench.table import failure_lines, record_table
+from aliasbench.bench.table import failure_lines, record_tables
 
 
 def record(scene: str, technique: str, **changes: object) -> Record:
@@ -40,15 +40,17 @@ def run() -> Run:
     return {"schema": 1, "suite": "s", "started": "", "machine": {}, "unfinished": 0, "records": records}
 
 
-def printed(run: Run) -> str:
+def printed(run: Run, width: int = 140) -> str:
     stream = io.StringIO()
-    Console(file=stream, width=200).print(record_table(run))
+    console = Console(file=stream, width=width)
+    for table in record_tables(run, width):
+        console.print(table)
     return stream.getvalue()
 
 
 def test_every_record_has_a_row_with_its_time_in_milliseconds(run: Run) -> None:
     text = printed(run)
-    assert text.count("11 (10 to 12)") == 2
+    assert text.count("10 to 12") == 2
     assert "0.01235" in text
     assert text.count("failed") == 2
     assert "-3.7e-17" not in text
@@ -56,7 +58,7 @@ def test_every_record_has_a_row_with_its_time_in_milliseconds(run: Run) -> None:
 
 def test_only_metrics_that_some_record_has_get_a_column(run: Run) -> None:
     text = printed(run)
-    assert "apparent_rate" in text
+    assert "rev/s" in text
     assert "jaggies" not in text
 
 
@@ -64,5 +66,17 @@ def test_a_reason_is_given_once_with_all_its_cases_and_as_it_was_written(run: Ru
     assert failure_lines(run) == ["failed: lamp [bold]broke\n    b by x, b by y"]
 
 
-def test_a_run_without_records_is_a_table_too(run: Run) -> None:
-    assert "s: 0 cases" in printed({**run, "records": []})
+def test_a_run_without_records_has_no_tables(run: Run) -> None:
+    assert printed({**run, "records": []}) == ""
+
+
+def test_a_value_under_the_reference_s_floor_says_so(run: Run) -> None:
+    hidden = {"rmse": {"value": None, "status": "below_reference_floor", "extras": {"floor": 0.0295}}}
+    assert "< 0.029" in printed({**run, "records": [record("a", "x", metrics=hidden)]})
+
+
+def test_in_a_narrow_terminal_no_word_is_cut_and_a_doubtful_time_is_marked(run: Run) -> None:
+    noisy = record("a", "raytrace:spp=16,sampler=jittered", seconds=[0.01, 0.02, 0.03, 0.04, 0.05])
+    text = printed({**run, "records": [noisy]}, 80)
+    assert "~30" in text
+    assert max(map(len, text.splitlines())) <= 80
