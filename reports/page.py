@@ -5,6 +5,7 @@ as a build artifact and opened from a disk. This module gathers; figures, charts
 """
 
 import os
+import re
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import jinja2
+from markupsafe import Markup, escape
 from plotly.offline import get_plotlyjs
 
 from aliasbench.reports import charts, tables
@@ -80,6 +82,11 @@ def write_report(run_dirs: Sequence[Path], out: Path) -> Path:
     return page
 
 
+def _breakable(text: str) -> Markup:
+    """Return text that may wrap after a colon or a comma, where names have their joints."""
+    return Markup(re.sub(r"([:,])", r"\1<wbr>", str(escape(text))))
+
+
 def render_page(runs: Sequence[Run]) -> str:
     """Return the whole page as text."""
     records = [record for run in runs for record in run.records]
@@ -93,6 +100,7 @@ def render_page(runs: Sequence[Run]) -> str:
         lstrip_blocks=True,
         undefined=jinja2.StrictUndefined,
     )
+    environment.filters["breakable"] = _breakable
     return environment.get_template("page.html.j2").render(
         runs=runs,
         machines=[_machine_facts(run) for run in runs if run.machine],

@@ -123,7 +123,8 @@ def test_nothing_is_wider_than_the_window_and_the_theme_follows(opened: Opened) 
             page.set_viewport_size({"width": width, "height": 844})
             page.wait_for_function("w => document.querySelector('.chart .main-svg').clientWidth < w", arg=width)
             assert page.evaluate("document.documentElement.scrollWidth") <= width
-            assert page.locator(".chart .scatterlayer .point").count() == 4
+            # The chart is drawn anew for each width: all its points come back.
+            page.wait_for_function("document.querySelectorAll('.chart .scatterlayer .point').length === 4")
         assert page.evaluate("getComputedStyle(document.body).backgroundColor") == background
         ink.append(page.locator(".chart .xtitle").evaluate("t => getComputedStyle(t).fill"))
     assert ink[0] != ink[1]
