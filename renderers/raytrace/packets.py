@@ -40,7 +40,6 @@ from aliasbench.renderers.raytrace.lanes import (
 )
 from aliasbench.renderers.raytrace.shading import MISS, Tables, shade_flat, shade_textured
 from aliasbench.renderers.raytrace.tables import Mesh
-from aliasbench.scenes.errors import InputError
 from aliasbench.scenes.model import FloatArray
 
 IntArray = NDArray[np.int32]
@@ -265,7 +264,7 @@ class PacketEngine:
     ) -> None:
         """Write the picture (h, w, 3)."""
         if self._still is None:
-            raise InputError("this renderer has been closed")
+            raise RuntimeError("this renderer has been closed")
         shared: tuple[object, ...] = (camera, pattern, tables)
         if moving:
             kernel, arguments = render_moving, (self._still.handle, self._handles, *shared)

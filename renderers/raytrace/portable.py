@@ -32,7 +32,6 @@ from aliasbench.renderers.raytrace.lanes import (
 )
 from aliasbench.renderers.raytrace.shading import MISS, Tables, shade_flat, shade_textured
 from aliasbench.renderers.raytrace.tables import Mesh
-from aliasbench.scenes.errors import InputError
 from aliasbench.scenes.model import FloatArray
 
 RayArray = NDArray[np.float32]
@@ -69,7 +68,7 @@ class PortableEngine:
     def fill(self, camera: FloatArray, pattern: Sampling, tables: Tables, moving: bool, out: RayArray) -> None:
         """Write the picture (h, w, 3)."""
         if self._is_closed:
-            raise InputError("this renderer has been closed")
+            raise RuntimeError("this renderer has been closed")
         per_row = -(-out.shape[1] * pattern.samples // LANES)
         rows = max(1, _BATCH // per_row)
         scratch = np.zeros((rows * per_row, SCRATCH_SIZE))

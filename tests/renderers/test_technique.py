@@ -1,11 +1,16 @@
 """The technique text: defaults resolve as documented, and nothing unknown or without effect is accepted."""
 
+from typing import Any, cast
+
+import numpy as np
 import pytest
 
 from aliasbench.renderers.catalog import TECHNIQUES, prepare, resolve_technique
 from aliasbench.renderers.technique import FILTER_RADII, KEYS, SAMPLER_NAMES, parse_technique
 from aliasbench.scenes.errors import InputError
 from aliasbench.scenes.model import Camera, Scene
+
+EMPTY = Scene("empty", Camera("orthographic", height=2.0))
 
 
 def test_a_bare_renderer_is_the_point_sampled_default() -> None:
@@ -107,8 +112,33 @@ def test_every_key_is_read_by_some_renderer_and_every_preset_parses() -> None:
     assert set(SAMPLER_NAMES) >= {"center", "grid", "random", "jittered"}
 
 
-@pytest.mark.parametrize("size", [(0, 5), (5, 0), (-1, 5), (2**20, 5), (True, 5), (2.5, 5)])
+@pytest.mark.parametrize("size", [(0, 5), (5, 0), (-1, 5), (2**20, 5), (True, 5), (2.5, 5), ("4", 4)])
 def test_impossible_sizes_are_refused_before_any_renderer_starts(size: tuple[int, int]) -> None:
-    scene = Scene("empty", Camera("orthographic", height=2.0))
     with pytest.raises(InputError, match="must be a whole number from 1 to 65536"):
-        prepare(scene, "raytrace:", size=size)
+        prepare(EMPTY, "raytrace:", size=size)
+
+
+@pytest.mark.parametrize("size", [4, (4,), (4, 4, 4), "4x4", None])
+def test_a_size_is_a_pair(size: Any) -> None:
+    with pytest.raises(InputError, match=r"must be \(width, height\)"):
+        prepare(EMPTY, "raytrace:", size=size)
+
+
+@pytest.mark.parametrize("technique", ["raytrace:", "raster:", "reference:"])
+def test_frames_and_seeds_are_whole_numbers_and_a_closed_scene_says_so(technique: str) -> None:
+    with prepare(EMPTY, technique, size=(4, 3)) as prepared:
+        for wrong in (-1, 1.5, True, "0", 2**70):
+            with pytest.raises(InputError, match=r"frame=.*: must be a whole number from 0"):
+                prepared.render(frame=cast(int, wrong))
+            with pytest.raises(InputError, match=r"seed=.*: must be a whole number from 0"):
+                prepared.render(seed=cast(int, wrong))
+        assert prepared.render(frame=cast(int, np.int64(2)), seed=2**53).pixels.shape == (3, 4, 3)
+    with pytest.raises(RuntimeError, match="closed"):
+        prepared.render()
+
+
+def test_other_types_are_named() -> None:
+    with pytest.raises(TypeError, match=r"scene must be a Scene.*not str"):
+        prepare(cast(Scene, "edge-fan"), "raytrace:", size=(4, 4))
+    with pytest.raises(TypeError, match="technique must be a Technique or its text, not int"):
+        prepare(EMPTY, cast(str, 3), size=(4, 4))

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from aliasbench.renderers.catalog import prepare, render
-from aliasbench.scenes.errors import InputError
 from aliasbench.scenes.model import Animation, Camera, Checker, ImageTexture, Motion, Scene, Spin, Surface, read_only
 
 SIZE = (67, 45)
@@ -80,5 +79,5 @@ def test_a_closed_portable_renderer_says_so(flat_scene: Any, quad: Any) -> None:
     prepared = prepare(build(flat_scene, quad, "flat"), "raytrace:engine=portable", size=(4, 4))
     with prepared:
         assert prepared.render().pixels.shape == (4, 4, 3)
-    with pytest.raises(InputError, match="closed"):
+    with pytest.raises(RuntimeError, match="closed"):
         prepared.render()

@@ -177,7 +177,7 @@ def test_two_prepared_scenes_do_not_touch_each_other_and_close_twice(quad: Any, 
         assert one.render().pixels[4, 4].tolist() == [1.0, 0.0, 0.0]
         assert two.render().pixels[4, 4].tolist() == [0.0, 1.0, 0.0]
     one.__exit__(None, None, None)
-    with pytest.raises(InputError, match="closed"):
+    with pytest.raises(RuntimeError, match="closed"):
         one.render()
 
 
