@@ -6,11 +6,16 @@ code 2; unknown commands and options name the nearest one.
 
 import argparse
 import re
+import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import NoReturn
+from typing import TYPE_CHECKING, NoReturn
 
+from aliasbench.bench.wording import shortened, shown
 from aliasbench.scenes.errors import InputError, NotAvailableError, unknown_name
+
+if TYPE_CHECKING:
+    from _typeshed import SupportsWrite
 
 MAX_SIDE = 65536
 MAX_WHOLE = 2**31 - 1
@@ -34,7 +39,15 @@ EXECUTORS = ("local", "dask")
 class Parser(argparse.ArgumentParser):
     """A parser whose complaints are errors of this project."""
 
+    def print_help(self, file: "SupportsWrite[str] | None" = None) -> None:
+        """Write the help; an error of the output is the caller's to see (argparse says nothing of it)."""
+        (file or sys.stdout).write(self.format_help())
+
     def error(self, message: str) -> NoReturn:
+        option = re.fullmatch(r"argument (?:-\w/)?(--\w+): expected one argument", message)
+        if option is not None:
+            what = re.search(rf"{option[1]} ([^\s,\]]+)", self.format_help())
+            message = f"{option[1]} needs a value" + (f", {option[1]} {what[1]}" if what else "")
         raise InputError(f"{message} (see {self.prog} --help)")
 
 
@@ -51,12 +64,15 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         After printing help or the version.
     """
     parser, commands = _build()
+    arguments = _joined(arguments)
     words = [word for word in arguments if not word.startswith("-")]
     wants_help = any(word in ("-h", "--help") for word in arguments)
     if not arguments or (not words and not wants_help and "--version" not in arguments):
+        if arguments:
+            raise unknown_name("option of aliasbench", shortened(arguments[0]), ("--help", "--version"))
         raise InputError(f"no command given; known: {', '.join(COMMANDS)} (see aliasbench --help)")
     if words and words[0] not in COMMANDS:
-        raise unknown_name("command", words[0], COMMANDS)
+        raise unknown_name("command", shortened(words[0]), COMMANDS)
     if words and words[0] in NOT_YET and not wants_help:
         there = ", ".join(name for name in COMMANDS if name not in NOT_YET)
         raise NotAvailableError(f"the command {words[0]} is not available yet; available: {there}")
@@ -66,11 +82,22 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     return known
 
 
+def _joined(arguments: Sequence[str]) -> list[str]:
+    """Return the arguments with `--size -4x4` as `--size=-4x4`: argparse takes -4x4 for an option and not for wrong."""
+    joined: list[str] = []
+    for word in arguments:
+        if joined and re.fullmatch(r"--[a-z]+", joined[-1]) and re.match(r"-[0-9]", word):
+            joined[-1] += f"={word}"
+        else:
+            joined.append(word)
+    return joined
+
+
 def _unexpected(word: str, parser: argparse.ArgumentParser) -> InputError:
     if not word.startswith("-"):
-        return InputError(f"{parser.prog}: unexpected {word!r} (see {parser.prog} --help)")
+        return InputError(f"{parser.prog}: unexpected {shown(word)} (see {parser.prog} --help)")
     option = word.partition("=")[0]
-    return unknown_name(f"option of {parser.prog}", option, _options(parser))
+    return unknown_name(f"option of {parser.prog}", shortened(option), _options(parser))
 
 
 def _options(parser: argparse.ArgumentParser) -> list[str]:
@@ -104,6 +131,7 @@ def _build() -> tuple[Parser, dict[str, Parser]]:
     export = commands["export"]
     export.add_argument("run_dir", type=Path, metavar="RUN_DIR")
     export.add_argument("--format", default="json", metavar="FORMAT", help="json")
+    export.add_argument("--json", dest="format", action="store_const", const="json", help="the same as --format json")
     export.add_argument("-o", "--output", type=Path, metavar="FILE", help="default: standard output")
     return parser, commands
 
@@ -157,8 +185,9 @@ def whole(low: int, high: int = MAX_WHOLE) -> Callable[[str], int]:
     """Return a reader of whole numbers of a range."""
 
     def read(text: str) -> int:
-        if not re.fullmatch(r"[+-]?[0-9]+", text) or not low <= int(text) <= high:
-            raise InputError(f"{text!r} must be a whole number from {low} to {high}")
+        # Python converts no more than some thousand digits; nothing allowed has twenty.
+        if not re.fullmatch(r"[+-]?[0-9]{1,20}", text) or not low <= int(text) <= high:
+            raise InputError(f"{shown(text)} must be a whole number from {low} to {high}")
         return int(text)
 
     return read
@@ -168,26 +197,25 @@ def read_size(text: str) -> tuple[int, int]:
     """Return (width, height) of a text like 512x512."""
     match = re.fullmatch(r"([0-9]+)x([0-9]+)", text)
     if match is None:
-        raise InputError(f"{text!r} must be WIDTHxHEIGHT, as in 512x512")
-    sides = int(match[1]), int(match[2])
-    for name, side in zip(("width", "height"), sides, strict=True):
-        if not 1 <= side <= MAX_SIDE:
-            raise InputError(f"{text!r}: {name} must be from 1 to {MAX_SIDE}")
-    return sides
+        raise InputError(f"{shown(text)} must be WIDTHxHEIGHT, as in 512x512")
+    for name, side in zip(("width", "height"), match.groups(), strict=True):
+        if len(side) > 20 or not 1 <= int(side) <= MAX_SIDE:
+            raise InputError(f"{shown(text)}: {name} must be from 1 to {MAX_SIDE}")
+    return int(match[1]), int(match[2])
 
 
 def read_shard(text: str) -> tuple[int, int]:
     """Return (i, n) of a text like 2/4, i from 1 to n."""
-    match = re.fullmatch(r"([0-9]+)/([0-9]+)", text)
+    match = re.fullmatch(r"([0-9]{1,20})/([0-9]{1,20})", text)
     if match is None or not 1 <= int(match[1]) <= int(match[2]):
-        raise InputError(f"{text!r} must be i/n with i from 1 to n, as in 2/4")
+        raise InputError(f"{shown(text)} must be i/n with i from 1 to n, as in 2/4")
     return int(match[1]), int(match[2])
 
 
 def read_executor(text: str) -> str:
     """Return the executor's name, where it is there."""
     if text not in EXECUTORS:
-        raise unknown_name("executor", text, EXECUTORS)
+        raise unknown_name("executor", shortened(text), EXECUTORS)
     if text != "local":
         raise InputError(f"executor {text} is not available yet; available: local")
     return text

@@ -6,9 +6,8 @@ that help is there at once.
 """
 
 import argparse
-import io
 import json
-import os
+import shlex
 import sqlite3
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -17,12 +16,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from aliasbench.bench.arguments import parse
+from aliasbench.bench.streams import discard_output, open_streams, writing_output
+from aliasbench.bench.wording import duration, printable, sentence
 from aliasbench.scenes.errors import InputError, UnsupportedScene, unknown_name
 
 if TYPE_CHECKING:
+    from aliasbench.bench.export import Run
     from aliasbench.bench.run import Step
 
 OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+NOWHERE = "cannot print: standard output is closed"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -33,21 +36,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
     arguments : sequence of str, optional
         Without the program's name; default: those of the process.
     """
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="replace")
+    can_print = open_streams()
     try:
-        code = _run_command(sys.argv[1:] if arguments is None else list(arguments))
-        sys.stdout.flush()
+        code = _run_command(sys.argv[1:] if arguments is None else list(arguments), can_print)
     except BrokenPipeError:
         # Whoever read the output has seen enough; what is still buffered must not complain at exit.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        discard_output()
         return OK
     except UnsupportedScene as error:
         return _complain(f"unsupported: {error}", BAD_INPUT)
     except InputError as error:
         return _complain(str(error), BAD_INPUT)
-    except (OSError, sqlite3.Error) as error:
+    except OSError as error:
+        where = f" ({str(error.filename)!r})" if error.filename else ""
+        return _complain(f"cannot go on: {error.strerror or error}{where}", BAD_INPUT)
+    except sqlite3.Error as error:
         return _complain(f"cannot go on: {error}", BAD_INPUT)
     except MemoryError:
         return _complain("not enough memory for this; choose a smaller size", BAD_INPUT)
@@ -56,26 +59,38 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return code
 
 
+def _say(text: str) -> None:
+    with writing_output():
+        print(text)
+
+
 def _complain(text: str, code: int) -> int:
-    print(f"aliasbench: {' '.join(text.split())}", file=sys.stderr)
+    print(f"aliasbench: {sentence(text)}", file=sys.stderr)
     return code
 
 
-def _run_command(arguments: Sequence[str]) -> int:
+def _run_command(arguments: Sequence[str], can_print: bool) -> int:
     try:
-        options = parse(arguments)
+        with writing_output():
+            options = parse(arguments)
     except SystemExit as done:
-        return int(done.code or 0)
+        if not can_print:
+            raise InputError(NOWHERE) from None
+        with writing_output():
+            return int(done.code or 0)
+    # Files are worth making without it; what is only printed is not.
+    if not can_print and (getattr(options, "output", None) is None or getattr(options, "json", False)):
+        raise InputError(NOWHERE)
     if options.version:
         from aliasbench.bench.machine import project_version
 
-        print(f"aliasbench {project_version()}")
+        _say(f"aliasbench {project_version()}")
         return OK
     return _COMMANDS[options.command](options)
 
 
 def _print_json(value: object) -> None:
-    print(json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False))
+    _say(json.dumps(value, indent=2, allow_nan=False))
 
 
 def _doctor(options: argparse.Namespace) -> int:
@@ -85,7 +100,7 @@ def _doctor(options: argparse.Namespace) -> int:
     if options.json:
         _print_json(diagnosis)
     else:
-        print("\n".join(describe(diagnosis)))
+        _say("\n".join(describe(diagnosis)))
     return OK if diagnosis["ok"] else FAILED
 
 
@@ -99,7 +114,7 @@ def _list(options: argparse.Namespace) -> int:
     if options.json:
         _print_json(rows)
     else:
-        print("\n\n".join("\n".join(describe(section, found)) for section, found in rows.items()))
+        _say("\n\n".join("\n".join(describe(section, found)) for section, found in rows.items()))
     return OK
 
 
@@ -111,7 +126,8 @@ def _render(options: argparse.Namespace) -> int:
     check_output(options.output)
     technique = catalog.resolve_technique(options.technique)
     scene = load_scene(options.scene)
-    frame = catalog.render(scene, technique, size=options.size, frame=options.frame, seed=options.seed)
+    with _waiting(f"{scene.name} by {technique.text}"):
+        frame = catalog.render(scene, technique, size=options.size, frame=options.frame, seed=options.seed)
     write_image(options.output, frame.pixels)
     facts = {
         "scene": scene.name,
@@ -129,7 +145,7 @@ def _render(options: argparse.Namespace) -> int:
     if options.json:
         _print_json(facts)
     else:
-        print(f"{options.output}: {scene.name} by {technique.text}, {frame.seconds * 1e3:.3g} ms")
+        _say(printable(f"{options.output}: {scene.name} by {technique.text}, {duration(frame.seconds)}"))
     return OK
 
 
@@ -154,55 +170,76 @@ def _run(options: argparse.Namespace) -> int:
         with _progress() as on_step:
             start_run(request, options.output, resume=options.resume, fresh=options.fresh, on_step=on_step)
     except KeyboardInterrupt:
-        again = f"aliasbench run -o {options.output} --resume"
+        again = f"aliasbench run -o {shlex.quote(str(options.output))} --resume"
         return _complain(f"interrupted; what is done is kept, and goes on with: {again}", INTERRUPTED)
     run = load_run(options.output)
     if options.json:
         _print_json(run)
     else:
-        _print_table(options.output)
+        _print_table(run, options.output)
     return FAILED if any(record["status"] == "failed" for record in run["records"]) else OK
 
 
-def _print_table(run_dir: Path) -> None:
+def _print_table(run: "Run", run_dir: Path) -> None:
     from rich.console import Console
 
-    from aliasbench.bench.export import load_run
-    from aliasbench.bench.table import failure_lines, record_tables
+    from aliasbench.bench.table import failure_lines, legend_lines, record_tables
 
-    run = load_run(run_dir)
     width = None if sys.stdout.isatty() else 140
     console = Console(width=width, highlight=False)
-    for table in record_tables(run, console.width):
-        console.print(table)
-    for line in failure_lines(run):
-        print(line)
+    with console.capture() as tables:
+        for table in record_tables(run, console.width):
+            console.print(table)
     counts = {s: sum(r["status"] == s for r in run["records"]) for s in ("ok", "failed", "unsupported")}
-    print(f"{run_dir}: " + ", ".join(f"{count} {status}" for status, count in counts.items()))
+    total = ", ".join(f"{count} {status}" for status, count in counts.items())
+    lines = [*legend_lines(run, console.width), *failure_lines(run), f"{printable(str(run_dir))}: {total}"]
+    _say(tables.get() + "\n".join(lines))
+
+
+@contextmanager
+def _waiting(what: str) -> Iterator[None]:
+    """Show on a terminal what goes on, and for how long."""
+    if not sys.stderr.isatty():
+        yield
+        return
+    from rich.console import Console
+    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    columns = (SpinnerColumn(), TimeElapsedColumn(), TextColumn("{task.description}", markup=False))
+    with Progress(*columns, console=Console(stderr=True), transient=True) as spinner:
+        spinner.add_task(printable(what), total=None)
+        yield
 
 
 @contextmanager
 def _progress() -> "Iterator[Callable[[Step], None]]":
     """Yield a listener that shows how far the run is: a bar with the time left, or a line for each thing begun."""
+    from aliasbench.bench.progress import ProgressLog
+
+    log = ProgressLog()
+
+    def say(step: "Step") -> None:
+        line = log.line(step)
+        if line is not None:
+            print(line, file=sys.stderr, flush=True)
+
     if not sys.stderr.isatty():
-        said: list[str] = []
-
-        def say(step: "Step") -> None:
-            if step.doing not in said[-1:]:
-                said.append(step.doing)
-                print(f"[{step.done}/{step.total}] {step.doing}", file=sys.stderr, flush=True)
-
         yield say
         return
     from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 
     columns = (BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(), TextColumn("{task.description}", markup=False))
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("starting", total=None)
+        tasks: list[TaskID] = []
 
         def show(step: "Step") -> None:
-            bar.update(task, completed=step.done, total=step.total, description=step.doing)
+            if step.total == 0:
+                bar.console.print(printable(step.doing), markup=False, highlight=False)
+                return
+            if not tasks:
+                tasks.append(bar.add_task("", total=step.total))
+            bar.update(tasks[0], completed=step.done, total=step.total, description=printable(step.doing))
 
         yield show
 
@@ -214,7 +251,7 @@ def _report(options: argparse.Namespace) -> int:
     if options.json:
         _print_json({"report": str(page)})
     else:
-        print(page)
+        _say(printable(str(page)))
     return OK
 
 
@@ -223,9 +260,9 @@ def _export(options: argparse.Namespace) -> int:
 
     if options.format != "json":
         raise unknown_name("format", options.format, ["json"])
-    text = json.dumps(load_run(options.run_dir), indent=2, ensure_ascii=False, allow_nan=False)
+    text = json.dumps(load_run(options.run_dir), indent=2, allow_nan=False)
     if options.output is None:
-        print(text)
+        _say(text)
         return OK
     try:
         options.output.write_text(text + "\n", encoding="utf-8")

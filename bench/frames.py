@@ -29,16 +29,25 @@ def check_output(path: Path) -> None:
     if path.suffix.lower() not in EXTENSIONS:
         raise unknown_name(f"extension of {str(path)!r}:", path.suffix, EXTENSIONS)
     folder = path.parent
-    if not folder.is_dir():
-        raise InputError(f"cannot write {str(path)!r}: no such folder {str(folder)!r}")
-    if path.is_dir():
-        raise InputError(f"cannot write {str(path)!r}: it is a folder")
+    check_folder_name(folder)
     try:
+        if not folder.is_dir():
+            raise InputError(f"cannot write {str(path)!r}: no such folder {str(folder)!r}")
+        if path.is_dir():
+            raise InputError(f"cannot write {str(path)!r}: it is a folder")
         handle, probe = tempfile.mkstemp(prefix=TEMPORARY_PREFIX, dir=folder)
     except OSError as error:
         raise InputError(f"cannot write {str(path)!r}: {error.strerror or error}") from None
     os.close(handle)
     Path(probe).unlink()
+
+
+def check_folder_name(folder: Path) -> None:
+    """Raise `InputError` for a folder in which OpenImageIO could not write: its file names are UTF-8 alone."""
+    try:
+        str(folder).encode()
+    except UnicodeEncodeError:
+        raise InputError(f"cannot write into {str(folder)!r}: its name is not UTF-8") from None
 
 
 def write_image(path: Path, pixels: NDArray[np.floating]) -> None:

@@ -20,6 +20,7 @@ from aliasbench.bench.attempt import Attempt
 from aliasbench.bench.frames import write_image
 from aliasbench.bench.machine import describe_machine
 from aliasbench.bench.quality import MetricError, describe_nonfinite, measure_all, render_frames
+from aliasbench.bench.resume import check_folder, forget_lost_pictures, refuse_other_run, stored_request
 from aliasbench.bench.store import RunStore, StoredCase
 from aliasbench.bench.suite import Case, Plan, Request, plan_run
 from aliasbench.bench.timing import interleaved
@@ -84,7 +85,8 @@ def start_run(
     run_dir : Path
         Made where it is missing.
     resume : bool
-        Go on with the run in the directory; where it was killed before it began, begin.
+        Go on with the run in the directory; where it was killed before it began, begin. Cases of which a picture is
+        missing or damaged are done again.
     fresh : bool
         Replace the run in the directory.
     on_step : callable, optional
@@ -93,49 +95,60 @@ def start_run(
     Raises
     ------
     InputError
-        If the request is wrong, the directory holds a run and neither `resume` nor `fresh` is given, the run to go on
-        with has other cases or was made by another machine or version, or another process writes there.
+        If the request is wrong, the directory holds a run and neither `resume` nor `fresh` is given, or other files
+        and no run, the run to go on with is missing, has other cases or was made by another machine or version, or
+        another process writes there.
     """
     if resume and fresh:
         raise InputError("--resume goes on with a run and --fresh replaces it: give one of them")
-    going_on = resume and stores.holds_run(run_dir)
+    # A run may have been killed before it made its folder: then what is asked for begins.
+    holds_run = check_folder(run_dir, must_exist=resume and request == Request())
+    going_on = resume and holds_run
     if going_on and request == Request():
-        request = _stored_request(run_dir)
+        request = stored_request(run_dir)
     plan = plan_run(request)
     facts = _facts(request, plan)
     if going_on:
-        _refuse_other_run(run_dir, facts)
+        refuse_other_run(run_dir, facts)
         store = RunStore.reopen(run_dir)
     else:
-        if resume and run_dir.is_dir() and not stores.is_untouched(run_dir):
-            raise InputError(f"{str(run_dir)!r} is no run directory: it has no {stores.DATABASE}, but other files")
-        if fresh and stores.holds_run(run_dir):
+        if fresh and holds_run:
             stores.remove_run(run_dir)
         store = RunStore.create(run_dir, facts, [case.spec() for case in plan.cases])
     with store:
+        lost = forget_lost_pictures(store)
+        if lost and on_step is not None:
+            on_step(Step(f"{lost} case{'s' if lost > 1 else ''} done again: pictures missing or damaged", 0, 0))
         execute(plan.cases, store, on_step)
 
 
 def execute(cases: Iterable[Case], store: RunStore, on_step: OnStep | None = None) -> None:
     """Do what is left to do of the cases, in order, committing each result as soon as it is there."""
-    finished = {stored.spec["id"]: stored.is_finished for stored in store.cases()}
+    stored = {case.spec["id"]: case for case in store.cases()}
     groups = [list(g) for _, g in groupby(cases, key=lambda c: (c.scene.name, c.size))]
-    groups = [[c for c in group if not finished[c.id]] for group in groups]
-    progress = _Progress(sum(_steps(group) for group in groups), on_step)
-    for group in groups:
+    groups = [[c for c in group if not stored[c.id].is_finished] for group in groups]
+    steps = [_steps(group, stored) for group in groups]
+    progress = _Progress(sum(steps), on_step)
+    for group, count in zip(groups, steps, strict=True):
         if group:
+            planned = progress.done + count
             with ExitStack() as stack:
                 live = _Group(store, progress, stack)
                 _find_quality(group, live)
                 _find_speed(group, live)
+            progress.advance(planned - progress.done)
+    progress.say("done" if progress.total else "nothing left to do")
 
 
-def _steps(group: list[Case]) -> int:
-    return _reference_steps(group) + sum(c.frames * len(c.seeds) + c.rounds + 1 for c in group)
+def _steps(group: list[Case], stored: Mapping[str, StoredCase]) -> int:
+    """Return how many renders are left to do if none of them fails."""
+    todo = [c for c in group if stored[c.id].outcome is None]
+    quality = sum(_reference_frames(todo).values()) + sum(c.frames * len(c.seeds) for c in todo)
+    return quality + sum(c.rounds - len(stored[c.id].seconds) + 1 for c in group if not _is_timed(c, stored[c.id]))
 
 
-def _reference_steps(group: list[Case]) -> int:
-    return sum(_reference_frames(group).values())
+def _is_timed(case: Case, stored: StoredCase) -> bool:
+    return len(stored.seconds) >= case.rounds
 
 
 def _reference_frames(group: list[Case]) -> Mapping[str, int]:
@@ -256,26 +269,3 @@ def _facts(request: Request, plan: Plan) -> dict[str, Any]:
         "machine": describe_machine(),
         "started": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
     }
-
-
-def _stored_request(run_dir: Path) -> Request:
-    stored = stores.read_facts(run_dir)["request"]
-    fields: dict[str, Any] = {key: tuple(v) if isinstance(v, list) else v for key, v in stored.items()}
-    return Request(**fields)
-
-
-def _refuse_other_run(run_dir: Path, facts: Mapping[str, Any]) -> None:
-    """Refuse to go on with a run that would not be the same run."""
-    old = stores.read_facts(run_dir)
-    if old["plan"] != facts["plan"]:
-        raise InputError(
-            f"cannot resume {str(run_dir)!r}: it holds the suite {old['suite']!r} with other cases than asked for now"
-            " (scenes, techniques, sizes, seeds or rounds differ); give another directory, or --fresh"
-        )
-    before, now = old["machine"], facts["machine"]
-    for key in sorted(before.keys() | now.keys()):
-        if before.get(key) != now.get(key):
-            raise InputError(
-                f"cannot resume {str(run_dir)!r}: its {key} was {before.get(key)!r} and is {now.get(key)!r} now; times"
-                " and pictures would not belong together; give another directory, or --fresh"
-            )

@@ -13,7 +13,8 @@ import fcntl
 import json
 import os
 import sqlite3
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -120,14 +121,12 @@ class RunStore:
             unfinished = run_dir / f".{DATABASE}"
             for suffix in ("", "-wal", "-shm", "-journal"):
                 (run_dir / f".{DATABASE}{suffix}").unlink(missing_ok=True)
-            connection = sqlite3.connect(unfinished)
-            with connection:
+            with _writing(run_dir), closing(sqlite3.connect(unfinished)) as connection, connection:
                 connection.executescript(f"BEGIN; {_TABLES} COMMIT;")
                 connection.execute(f"PRAGMA user_version = {SCHEMA}")
                 connection.executemany("INSERT INTO run VALUES (?, ?)", [(k, _dump(v)) for k, v in facts.items()])
                 rows = [(str(s["id"]), i, _dump(s)) for i, s in enumerate(specs)]
                 connection.executemany("INSERT INTO cases VALUES (?, ?, ?)", rows)
-            connection.close()
             unfinished.replace(run_dir / DATABASE)
         except BaseException:
             os.close(lock)
@@ -149,22 +148,25 @@ class RunStore:
     @classmethod
     def _open(cls, run_dir: Path, lock: int) -> Self:
         try:
-            for folder in (FRAMES, REFERENCES):
-                (run_dir / folder).mkdir(exist_ok=True)
-                remove_unfinished(run_dir / folder)
-            connection = sqlite3.connect(run_dir / DATABASE)
-            connection.execute("PRAGMA journal_mode = WAL")
-            connection.execute("PRAGMA synchronous = FULL")
-        except (OSError, sqlite3.Error) as error:
+            with _writing(run_dir):
+                for folder in (FRAMES, REFERENCES):
+                    (run_dir / folder).mkdir(exist_ok=True)
+                    remove_unfinished(run_dir / folder)
+                connection = sqlite3.connect(run_dir / DATABASE)
+                connection.execute("PRAGMA journal_mode = WAL")
+                connection.execute("PRAGMA synchronous = FULL")
+        except InputError:
             os.close(lock)
-            raise InputError(f"cannot write {str(run_dir)!r}: {error}") from None
+            raise
         return cls(run_dir, connection, lock)
 
     def close(self) -> None:
         """Fold the log into the database, so that the run is one file again, and let go of the folder."""
-        self._connection.execute("PRAGMA journal_mode = DELETE")
-        self._connection.close()
-        os.close(self._lock)
+        try:
+            with _writing(self.run_dir), closing(self._connection):
+                self._connection.execute("PRAGMA journal_mode = DELETE")
+        finally:
+            os.close(self._lock)
 
     def cases(self) -> list[StoredCase]:
         """Return every case of the plan, in its order, with what is known of it."""
@@ -172,15 +174,30 @@ class RunStore:
 
     def add_outcome(self, case_id: str, outcome: Json, *, trace: str | None = None) -> None:
         """Commit how a case came out; replaces an earlier outcome. `trace` is for whoever looks for a bug."""
-        with self._connection:
+        with _writing(self.run_dir), self._connection:
             row = (case_id, _dump(outcome), trace)
             self._connection.execute("INSERT OR REPLACE INTO outcomes VALUES (?, ?, ?)", row)
 
     def add_round(self, number: int, seconds: Mapping[str, float]) -> None:
         """Commit one round of timings: seconds by case id."""
-        with self._connection:
+        with _writing(self.run_dir), self._connection:
             rows = [(case_id, number, value) for case_id, value in seconds.items()]
             self._connection.executemany("INSERT OR IGNORE INTO timings VALUES (?, ?, ?)", rows)
+
+    def forget_outcomes(self, case_ids: Iterable[str]) -> None:
+        """Commit that these cases are to be done again; their timings stay."""
+        with _writing(self.run_dir), self._connection:
+            self._connection.executemany("DELETE FROM outcomes WHERE id = ?", [(i,) for i in case_ids])
+
+
+@contextmanager
+def _writing(run_dir: Path) -> Iterator[None]:
+    """Name the folder in whatever goes wrong while it is written: SQLite's own words name nothing."""
+    try:
+        yield
+    except (OSError, sqlite3.Error) as error:
+        reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
+        raise InputError(f"cannot write {str(run_dir)!r}: {reason}") from None
 
 
 def acquire_lock(run_dir: Path) -> int:
@@ -234,10 +251,13 @@ def read_cases(run_dir: Path) -> list[StoredCase]:
 
 def _connect_read_only(run_dir: Path) -> sqlite3.Connection:
     path = run_dir / DATABASE
-    if not run_dir.is_dir():
-        raise InputError(f"{str(run_dir)!r}: no such run directory")
-    if not path.is_file():
-        raise InputError(f"{str(run_dir)!r} is no run directory: it has no {DATABASE}")
+    try:
+        if not run_dir.is_dir():
+            raise InputError(f"{str(run_dir)!r}: no such run directory")
+        if not path.is_file():
+            raise InputError(f"{str(run_dir)!r} is no run directory: it has no {DATABASE}")
+    except OSError as error:
+        raise InputError(f"run directory {str(run_dir)!r}: cannot be read ({error.strerror or error})") from None
     log = run_dir / f"{DATABASE}-wal"
     # A finished run may lie on a medium that nobody can write to, where SQLite cannot make its shared memory.
     mode = "mode=ro" if log.exists() or os.access(run_dir, os.W_OK) else "immutable=1"
@@ -269,4 +289,4 @@ def _cases(connection: sqlite3.Connection) -> list[StoredCase]:
 
 
 def _dump(value: object) -> str:
-    return json.dumps(value, allow_nan=False, ensure_ascii=False)
+    return json.dumps(value, allow_nan=False)

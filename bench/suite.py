@@ -6,7 +6,7 @@ every run and a changed scene file is noticed.
 """
 
 import re
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
 
 from aliasbench.bench.suite_file import Group, SuiteFile, read_suite
@@ -129,7 +129,7 @@ def _expand(suite: SuiteFile, groups: Sequence[Group]) -> list[Case]:
     """Return scenes x techniques of every group, each scene's cases of one size together, in order of appearance."""
     scenes: dict[str, tuple[Scene, str]] = {}
     names: dict[str, str] = {}
-    cases: dict[str, Case] = {}
+    cases: dict[Hashable, Case] = {}
     for group in groups:
         for scene_text in group.scenes:
             if scene_text not in scenes:
@@ -140,11 +140,26 @@ def _expand(suite: SuiteFile, groups: Sequence[Group]) -> list[Case]:
                 raise InputError(f"{suite.where}: two different scenes are called {scene.name!r}; rename one")
             for technique_text in group.techniques:
                 case = _case(scene, digest, _technique(suite, technique_text), group)
-                if case.id in cases:
-                    raise InputError(f"{suite.where}: {scene.name} by {case.technique.text} is there twice")
-                cases[case.id] = case
+                same = cases.setdefault(_pixels_key(case), case)
+                if same is not case:
+                    raise InputError(f"{suite.where}: {scene.name} by {_twice(same.technique, case.technique)}")
     order = {(c.scene.name, c.size): i for i, c in reversed(list(enumerate(cases.values())))}
     return sorted(cases.values(), key=lambda c: order[c.scene.name, c.size])
+
+
+def _pixels_key(case: Case) -> Hashable:
+    """Return what two cases have in common if they are the same one, however their techniques are spelled."""
+    return case.scene.name, _meaning(case.technique), case.size, case.frames, case.seeds, case.texture_truth
+
+
+def _meaning(technique: Technique) -> Technique:
+    return replace(technique, text="")
+
+
+def _twice(one: Technique, other: Technique) -> str:
+    if one.text == other.text:
+        return f"{one.text} is there twice"
+    return f"{one.text} is there twice: {other.text} is the same technique spelled differently; leave one of them out"
 
 
 def _load(suite: SuiteFile, text: str) -> Scene:
@@ -192,9 +207,11 @@ def _choose(cases: list[Case], request: Request) -> list[Case]:
         short = set(request.scenes) - exact
         cases = [c for c in cases if c.scene.name in exact or c.scene.name.partition(":")[0] in short]
     if request.techniques:
-        texts = {case.technique.text for case in cases}
-        wanted = {resolve_technique(text).text for text in request.techniques}
-        for text in sorted(wanted - texts):
-            raise unknown_name("technique of this suite:", text, texts)
-        cases = [c for c in cases if c.technique.text in wanted]
+        known_techniques = {_meaning(case.technique) for case in cases}
+        wanted = [resolve_technique(text) for text in request.techniques]
+        for technique in wanted:
+            if _meaning(technique) not in known_techniques:
+                raise unknown_name("technique of this suite:", technique.text, {c.technique.text for c in cases})
+        meanings = {_meaning(technique) for technique in wanted}
+        cases = [c for c in cases if _meaning(c.technique) in meanings]
     return cases

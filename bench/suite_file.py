@@ -26,11 +26,13 @@ from importlib import resources
 from pathlib import Path
 from typing import Literal
 
+from aliasbench.bench.wording import shown
 from aliasbench.scenes.errors import InputError, unknown_name
 
 SCHEMA = 1
 MAX_SIDE = 65536
 MAX_SEED = 2**31 - 1
+_NEEDED = f"schema = {SCHEMA}, scenes = [...] and techniques = [...]"
 
 Frames = int | Literal["loop"]
 
@@ -87,34 +89,43 @@ def read_suite(text: str) -> SuiteFile:
     if text in SUITES:
         packaged = resources.files("aliasbench.bench").joinpath("suites", SUITES[text].file)
         return parse_suite(packaged.read_text(encoding="utf-8"), f"suite {text}", None, text)
-    if not path.is_file():
+    try:
+        is_file = path.is_file()
+    except OSError as problem:
+        raise InputError(f"suite {shown(text)}: cannot be read ({problem.strerror})") from None
+    if not is_file:
         if path.suffix == ".toml" or path.name != text:
             raise InputError(f"suite {text!r}: no such file")
-        error = unknown_name("suite", text, SUITES)
-        raise InputError(f"{error} (or a path to a suite file, *.toml)")
+        unknown = unknown_name("suite", text, SUITES)
+        raise InputError(f"{unknown} (or a path to a suite file, *.toml)")
     try:
-        document = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"suite {text!r}: cannot be read ({error})") from None
+        document = path.read_bytes().decode("utf-8-sig")
+    except OSError as error:
+        raise InputError(f"suite {text!r}: cannot be read ({error.strerror or error})") from None
+    except UnicodeDecodeError as error:
+        raise InputError(
+            f"suite {text!r}: byte {error.start} is not UTF-8; a suite file is a TOML text in UTF-8"
+        ) from None
     return parse_suite(document, text, path.parent, path.stem)
 
 
 def parse_suite(document: str, where: str, folder: Path | None, default_name: str) -> SuiteFile:
     """Return the suite in a TOML text; `where` is what errors call it. See `read_suite`."""
-    try:
-        table = tomllib.loads(document)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{where}: not valid TOML: {error}") from None
-    schema = table.get("schema", SCHEMA)
+    table = _parse(document, where)
+    if "schema" not in table:
+        if not table:
+            raise InputError(f"{where}: is empty; a suite needs {_NEEDED}")
+        raise InputError(f"{where}: schema is missing; give schema = {SCHEMA} at the top")
+    schema = table["schema"]
     if isinstance(schema, bool) or not isinstance(schema, int) or schema < 1:
-        raise InputError(f"{where}: schema = {schema!r}: must be {SCHEMA}")
+        raise InputError(f"{where}: schema = {shown(schema)}: must be {SCHEMA}")
     if schema > SCHEMA:
-        raise InputError(f"{where}: schema = {schema} is newer than this version, which reads up to {SCHEMA}")
+        raise InputError(f"{where}: schema = {shown(schema)} is newer than this version, which reads up to {SCHEMA}")
     known = ("schema", "name", "summary", "case", *_READERS)
     _refuse_unknown(table, known, where)
     for key in ("name", "summary"):
         if not isinstance(table.get(key, ""), str):
-            raise InputError(f"{where}: {key} = {table[key]!r}: must be text")
+            raise InputError(f"{where}: {key} = {shown(table[key])}: must be text")
     base = _read_group({k: v for k, v in table.items() if k in _READERS}, Group(), where)
     groups = [base] if base.scenes else []
     cases = table.get("case", [])
@@ -133,6 +144,19 @@ def parse_suite(document: str, where: str, folder: Path | None, default_name: st
     return SuiteFile(str(table.get("name", default_name)), where, folder, tuple(groups))
 
 
+def _parse(document: str, where: str) -> dict[str, object]:
+    try:
+        return tomllib.loads(document)
+    except tomllib.TOMLDecodeError as error:
+        problem = str(error)
+    except RecursionError:
+        problem = "its values are nested too deeply"
+    except ValueError:
+        # What Python says of a whole number that has more digits than it converts.
+        problem = "a number has too many digits"
+    raise InputError(f"{where}: not valid TOML: {problem}")
+
+
 def _refuse_unknown(table: Mapping[str, object], known: Iterable[str], where: str) -> None:
     for key in table:
         if key not in known:
@@ -145,7 +169,7 @@ def _read_group(table: Mapping[str, object], base: Group, where: str) -> Group:
         try:
             group = _READERS[key](group, value)
         except InputError as error:
-            raise InputError(f"{where}: {key} = {value!r}: {error}") from None
+            raise InputError(f"{where}: {key} = {shown(value)}: {error}") from None
     return group
 
 
@@ -162,7 +186,7 @@ def _texts(value: object) -> tuple[str, ...]:
     texts = tuple(v.strip() for v in value)
     for text in texts:
         if texts.count(text) > 1:
-            raise InputError(f"{text!r} is there twice")
+            raise InputError(f"{shown(text)} is there twice")
     return texts
 
 

@@ -1,11 +1,12 @@
 """The records as a table for the terminal: what a reader wants to know first, and every warning and reason in words."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import groupby
 from typing import TYPE_CHECKING
 
 from aliasbench.bench.export import Record, Run
 from aliasbench.bench.timing import summarise
+from aliasbench.bench.wording import printable, sentence
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -33,7 +34,7 @@ def record_tables(run: Run, width: int) -> list["Table"]:
     for (scene, size), group in groupby(run["records"], key=lambda r: (r["scene"], tuple(r["size"]))):
         records = list(group)
         names = [n for n in HEADLINES if any(_number(r, n) != DASH for r in records)]
-        title = Text(f"{scene}  {size[0]} x {size[1]}", "bold")
+        title = Text(f"{printable(scene)}  {size[0]} x {size[1]}", "bold")
         table = Table(box=box.SIMPLE_HEAD, title=title, title_justify="left", pad_edge=False, padding=(0, 1, 0, 0))
         longest = max(len(r["technique"]) for r in records)
         table.add_column("technique", overflow="fold", min_width=min(longest, 24))
@@ -50,9 +51,35 @@ def record_tables(run: Run, width: int) -> list["Table"]:
             cells += [_number(record, name) for name in names]
             if wide:
                 cells.append("; ".join([*([] if record["status"] == "ok" else [record["status"]]), *warnings]))
-            table.add_row(Text(record["technique"], styles.get(record["status"], "")), *map(Text, cells))
+            table.add_row(Text(printable(record["technique"]), styles.get(record["status"], "")), *map(Text, cells))
         tables.append(table)
     return tables
+
+
+def legend_lines(run: Run, width: int) -> list[str]:
+    """Return what the marks in the tables mean, as far as they occur, and where a reference says too little.
+
+    A scene gets a line if more than half of its scores are under the floor of its reference, and that floor is not that
+    of rounding alone.
+    """
+    legend = []
+    if width < WIDE and any(_time(r["seconds"])[2] for r in run["records"]):
+        legend.append("~: doubtful time, see the report")
+    if any(_is_hidden(s) for r in run["records"] for s in r["metrics"].values()):
+        legend.append("< x: below what the reference can tell")
+    lines = ["; ".join(legend)] if legend else []
+    for (scene, size), group in groupby(run["records"], key=lambda r: (r["scene"], tuple(r["size"]))):
+        records = list(group)
+        scores = [s for r in records for s in r["metrics"].values()]
+        hidden = sum(_is_hidden(s) for s in scores)
+        known = sum(s["value"] is not None for s in scores)
+        uncertainty = max((r["uncertainty"] or 0.0 for r in records), default=0.0)
+        if hidden > known and uncertainty > NEGLIGIBLE:
+            lines.append(
+                f"{printable(scene)} {size[0]} x {size[1]}: its reference is uncertain by {uncertainty:.2g}, which"
+                f" hides {hidden} of {hidden + known} scores"
+            )
+    return lines
 
 
 def failure_lines(run: Run) -> list[str]:
@@ -60,8 +87,8 @@ def failure_lines(run: Run) -> list[str]:
     reasons: dict[str, list[str]] = {}
     for record in run["records"]:
         if record["error"]:
-            case = f"{record['scene']} by {record['technique']}"
-            reasons.setdefault(f"{record['status']}: {record['error']}", []).append(case)
+            case = printable(f"{record['scene']} by {record['technique']}")
+            reasons.setdefault(sentence(f"{record['status']}: {record['error']}"), []).append(case)
     return [f"{reason}\n    {', '.join(cases)}" for reason, cases in reasons.items()]
 
 
@@ -82,5 +109,9 @@ def _number(record: Record, name: str) -> str:
     if isinstance(value, float):
         return f"{value:.4g}" if abs(value) >= NEGLIGIBLE else "0"
     extras = score["extras"]
-    floor = extras.get("floor") if score["status"] == "below_reference_floor" and isinstance(extras, dict) else None
+    floor = extras.get("floor") if _is_hidden(score) and isinstance(extras, dict) else None
     return f"< {floor:.2g}" if isinstance(floor, float) else DASH
+
+
+def _is_hidden(score: Mapping[str, object]) -> bool:
+    return score["status"] == "below_reference_floor"

@@ -40,10 +40,14 @@ class Trouble:
 
 @dataclass(frozen=True, slots=True)
 class SceneSection:
-    """One scene at one size: its pictures, its chart (None where nothing can be drawn) and its table."""
+    """One scene at one size: its pictures, its chart (None where nothing can be drawn) and its table.
+
+    `link` is what leads here: the title, with the size where the scene has several.
+    """
 
     anchor: str
     title: str
+    link: str
     size: str
     gallery: Gallery
     figure: dict[str, Any] | None
@@ -139,19 +143,24 @@ def _scene_sections(records: Sequence[Record], runs: Sequence[str]) -> list[Scen
     for record in records:
         groups.setdefault((record.scene, record.size), []).append(record)
     galleries = make_galleries(list(groups.values()), runs)
+    names = [scene for scene, _ in groups]
+    links = [scene if names.count(scene) == 1 else f"{scene} {tables.size_text(size)}" for scene, size in groups]
     return [
-        _scene_section(f"scene-{number}", group, gallery, runs)
+        _scene_section(f"scene-{number}", links[number - 1], group, gallery, runs)
         for number, (group, gallery) in enumerate(zip(groups.values(), galleries, strict=True), 1)
     ]
 
 
-def _scene_section(anchor: str, group: Sequence[Record], gallery: Gallery, runs: Sequence[str]) -> SceneSection:
+def _scene_section(
+    anchor: str, link: str, group: Sequence[Record], gallery: Gallery, runs: Sequence[str]
+) -> SceneSection:
     points = charts.chart_points(group)
     drawn = {id(p.record) for p in points}
     return SceneSection(
         anchor=anchor,
         title=group[0].scene,
-        size="{} × {}".format(*group[0].size),
+        link=link,
+        size=tables.size_text(group[0].size),
         gallery=gallery,
         figure=charts.speed_chart(points, runs) if points else None,
         findings=charts.findings(points),

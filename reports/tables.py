@@ -16,6 +16,8 @@ from aliasbench.reports.records import Record, Score
 HEADLINES = ("rmse", "ssim", "jaggies", "shimmer", "moire", "strobing", "apparent_rate")
 MOST_EXTRAS = 8
 
+Column = tuple[str, tuple[int, int], str]  # of the overview: scene, size and run
+
 
 @dataclass(frozen=True, slots=True)
 class Cell:
@@ -89,30 +91,44 @@ def record_table(records: Sequence[Record], runs: Sequence[str]) -> Table:
             else Cell(f"{record.samples:,}", sort=str(record.samples))
         ]
         row += [_metric_cell(record, name, None) for name in names]
-        row += [Cell(f"{width} × {height}", sort=str(width * height)), Cell(str(record.frames)), Cell(record.seed)]
+        row += [Cell(size_text(record.size), sort=str(width * height)), Cell(str(record.frames)), Cell(record.seed)]
         rows.append(row)
     return Table(headings, rows, [record.status for record in records])
 
 
 def overview_table(records: Sequence[Record]) -> Table:
-    """Return RMSE and time of every technique (rows) in every scene (columns), tinted by the error.
+    """Return RMSE and time of every technique (rows) in every scene, size and run (columns), tinted by the error.
 
-    Several records of one technique in one scene (seeds, sizes, runs) show the first that has an RMSE.
+    A heading says the size where its scene has several, and the run where several have the scene. Several records of
+    one technique in one column (seeds) show the first that has an RMSE.
     """
-    scenes = list(dict.fromkeys(r.scene for r in records))
+    columns = list(dict.fromkeys((r.scene, r.size, r.run) for r in records))
     techniques = list(dict.fromkeys(r.technique for r in records))
-    found: dict[tuple[str, str], Record] = {}
+    found: dict[tuple[str, Column], Record] = {}
     for record in records:
-        key = (record.technique, record.scene)
+        key = (record.technique, (record.scene, record.size, record.run))
         if key not in found or (found[key].value("rmse") is None and record.value("rmse") is not None):
             found[key] = record
     rows, styles = [], []
     for technique in techniques:
-        cells = [found.get((technique, scene)) for scene in scenes]
+        cells = [found.get((technique, column)) for column in columns]
         first = next(r for r in cells if r is not None)
         rows.append([_technique_cell(first), *(_overview_cell(r) for r in cells)])
         styles.append("ok")
-    return Table([Heading("technique"), *(Heading(s, "", True) for s in scenes)], rows, styles)
+    return Table([Heading("technique"), *(_column_heading(column, columns) for column in columns)], rows, styles)
+
+
+def _column_heading(column: Column, columns: Sequence[Column]) -> Heading:
+    scene, size, run = column
+    of_scene = [other for other in columns if other[0] == scene]
+    parts = [size_text(size)] if len({other[1] for other in of_scene}) > 1 else []
+    parts += [run] if len({other[2] for other in of_scene}) > 1 else []
+    return Heading(scene, "", True, ", ".join(parts))
+
+
+def size_text(size: tuple[int, int]) -> str:
+    """Return a size as the page writes it: 256 × 128."""
+    return f"{size[0]} × {size[1]}"
 
 
 def note_text(record: Record) -> str:

@@ -14,7 +14,7 @@ from typing import Literal
 
 from aliasbench.scenes.confetti import build_confetti
 from aliasbench.scenes.edges import build_edge_fan, build_near_horizontal_edge
-from aliasbench.scenes.errors import InputError, unknown_name
+from aliasbench.scenes.errors import InputError, shortened, unknown_name
 from aliasbench.scenes.floors import build_brick_floor
 from aliasbench.scenes.model import Scene
 from aliasbench.scenes.propeller import build_propeller
@@ -34,9 +34,14 @@ class Parameter:
 
     def check(self, place: str, value: object) -> float:
         """Return the value as this parameter's kind of number; raise `InputError` if it is none or out of range."""
-        number, written = math.nan, str(value)
         if isinstance(value, Real) and not isinstance(value, bool):
-            number, written = float(value), _shortest(float(value))
+            try:
+                number = float(value)
+            except OverflowError:
+                number = math.inf if value == abs(value) else -math.inf
+            written = _shortest(number)
+        else:
+            number, written = math.nan, shortened(str(value))
         whole = self.kind == "float" or number.is_integer()
         if not (whole and self.low <= number <= self.high):
             what = "a whole number" if self.kind == "int" else "a number"
@@ -102,7 +107,11 @@ def build_scene(text: str) -> Scene:
     ------
     InputError
         If the name or a parameter is unknown, given twice, not a number or out of range.
+    TypeError
+        If `text` is none.
     """
+    if not isinstance(text, str):
+        raise TypeError(f"a scene of the catalog is named by a text, not by {type(text).__name__}")
     name, _, rest = (part.strip() for part in text.partition(":"))
     if name not in SCENES:
         raise unknown_name("scene", name, SCENES)
@@ -111,7 +120,9 @@ def build_scene(text: str) -> Scene:
     for item in rest.split(",") if rest else ():
         key, equals, value = (part.strip() for part in item.partition("="))
         if not key or not equals:
-            raise InputError(f"scene {name!r}: {item.strip()!r} is not key=value; known keys: {_known(entry)}")
+            raise InputError(
+                f"scene {name!r}: {shortened(item.strip())!r} is not key=value; known keys: {_known(entry)}"
+            )
         if key not in entry.parameters:
             problem = unknown_name("parameter", key, entry.parameters)
             raise InputError(f"scene {name!r}: {problem}")

@@ -7,6 +7,8 @@ renderer that cannot do a valid scene raises `UnsupportedScene` (a record, not a
 from collections.abc import Iterable
 from difflib import get_close_matches
 
+SHOWN = 60  # characters of a value in a message
+
 
 class InputError(ValueError):
     """Bad usage or input; the message is one sentence naming the value and what is allowed."""
@@ -18,6 +20,11 @@ class NotAvailableError(InputError):
 
 class UnsupportedScene(Exception):  # noqa: N818 - the name is part of the public contract
     """A valid scene that this renderer cannot render; the message names the feature."""
+
+
+def shortened(text: str) -> str:
+    """Return a text as a message quotes it: whole, or its beginning where it is long."""
+    return text if len(text) <= SHOWN else text[: SHOWN - 3] + "..."
 
 
 def unknown_name(kind: str, given: str, known: Iterable[str]) -> InputError:
@@ -33,6 +40,7 @@ def unknown_name(kind: str, given: str, known: Iterable[str]) -> InputError:
         Every name that would have been right.
     """
     names = sorted(known)
+    given = shortened(given)
     near = get_close_matches(given, names, n=1, cutoff=0.5)
     hint = f"; did you mean {near[0]!r}?" if near else ";"
     return InputError(f"unknown {kind} {given!r}{hint} known: {', '.join(names) or 'none'}")

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from aliasbench.scenes.errors import InputError
+from aliasbench.scenes.limits import COUNT, LENGTH
 from aliasbench.scenes.model import (
     Camera,
     EdgeFact,
@@ -94,9 +95,9 @@ def _read_rotor(table: Table, objects: Sequence[Surface]) -> RotorFact:
         axis=table.direction("axis", (0.0, 0.0, 1.0)),
         blades=table.whole("blades", at_least=1),
         duty=table.number("duty", above=0.0, below=1.0),
-        rev_per_s=table.number("rev_per_s"),
-        inner=table.number("inner", at_least=0.0),
-        outer=table.number("outer", above=0.0),
+        rev_per_s=table.number("rev_per_s", at_least=-COUNT, at_most=COUNT),
+        inner=table.number("inner", at_least=0.0, at_most=LENGTH),
+        outer=table.number("outer", above=0.0, at_most=LENGTH),
     )
     if fact.inner >= fact.outer:
         table.refuse("inner", f"less than outer, {fact.outer:g}")
@@ -128,7 +129,7 @@ def _rate_about(spin: Spin, axis: Vec3, center: Vec3) -> float | None:
 
 def _read_grating(table: Table) -> GratingFact:
     table.check_keys(("cycles_per_unit",))
-    x, y = table.numbers("cycles_per_unit", 2)
+    x, y = table.numbers("cycles_per_unit", 2, LENGTH)
     if x == y == 0.0:
         table.refuse("cycles_per_unit", "a frequency vector: two finite numbers, not both zero")
     return GratingFact((x, y))
@@ -136,7 +137,7 @@ def _read_grating(table: Table) -> GratingFact:
 
 def _read_pan(table: Table, objects: Sequence[Surface], camera: Camera) -> PanFact:
     table.check_keys(("velocity", "period"))
-    fact = PanFact(table.direction("velocity"), table.number("period", above=0.0))
+    fact = PanFact(table.direction("velocity"), table.number("period", at_least=1 / COUNT, at_most=LENGTH))
     known = bool(objects) and all(s.motion.matrices is None and s.motion.spin is None for s in objects)
     seen = [np.array(s.motion.velocity) - np.array(camera.velocity) for s in objects]
     close = TOLERANCE * math.hypot(*fact.velocity)

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from aliasbench.scenes.errors import InputError, NotAvailableError, unknown_name
+from aliasbench.scenes.limits import COUNT
 from aliasbench.scenes.model import (
     Checker,
     Grating,
@@ -59,23 +60,27 @@ def _read_texture(table: Table, folder: Path) -> Texture:
     inner = table.table(kind)
     if kind == "checker":
         inner.check_keys(("squares", "black", "white"))
-        across, up = inner.numbers("squares", 2)
+        across, up = inner.numbers("squares", 2, COUNT)
         if min(across, up) <= 0.0:
-            inner.refuse("squares", "two finite numbers over 0 (squares per unit of u and of v)")
+            inner.refuse("squares", f"two finite numbers over 0 and at most {COUNT:g} (squares per unit of u and of v)")
         return Checker((across, up), inner.color("black", (0.0, 0.0, 0.0)), inner.color("white", (1.0, 1.0, 1.0)))
     if kind == "grating":
         inner.check_keys(("cycles", "angle_deg", "phase", "profile", "low", "high"))
         return Grating(
-            cycles=inner.number("cycles", at_least=0.0),
-            angle_deg=inner.number("angle_deg", 0.0),
-            phase=inner.number("phase", 0.0),
+            cycles=inner.number("cycles", at_least=0.0, at_most=COUNT),
+            angle_deg=inner.number("angle_deg", 0.0, at_least=-COUNT, at_most=COUNT),
+            phase=inner.number("phase", 0.0, at_least=-COUNT, at_most=COUNT),
             profile="sine" if inner.choice("profile", ("sine", "square"), "sine") == "sine" else "square",
             low=inner.color("low", (0.0, 0.0, 0.0)),
             high=inner.color("high", (1.0, 1.0, 1.0)),
         )
     inner.check_keys(("center", "k", "phase"))
-    u, v = inner.numbers("center", 2) if inner.has("center") else (0.5, 0.5)
-    return ZonePlate((u, v), inner.number("k", above=0.0), inner.number("phase", 0.0))
+    u, v = inner.numbers("center", 2, COUNT) if inner.has("center") else (0.5, 0.5)
+    return ZonePlate(
+        center=(u, v),
+        k=inner.number("k", above=0.0, at_most=COUNT),
+        phase=inner.number("phase", 0.0, at_least=-COUNT, at_most=COUNT),
+    )
 
 
 def read_object(table: Table, textures: Mapping[str, Texture]) -> Surface:
@@ -91,7 +96,7 @@ def read_object(table: Table, textures: Mapping[str, Texture]) -> Surface:
     if texture is not None and texture not in textures:
         problem = unknown_name("texture", texture, textures)
         raise InputError(f"{table.file}: {table.where('texture')}: {problem}")
-    uv = table.points("uv", 2) if table.has("uv") else np.array(QUAD_UV) if shape == "quad" else None
+    uv = table.points("uv", 2, limit=COUNT) if table.has("uv") else np.array(QUAD_UV) if shape == "quad" else None
     if uv is not None and len(uv) != len(points):
         table.refuse("uv", f"a list of {len(points)} points of 2 numbers each, one for each point of the {shape}")
     if texture is not None and uv is None:
@@ -120,8 +125,8 @@ def _read_material(table: Table) -> Material:
     if kind == "glossy":
         return Material("glossy", roughness=table.number("roughness", 0.1, above=0.0, at_most=1.0))
     if kind == "glass":
-        abbe = table.number("abbe", above=0.0) if table.has("abbe") else None
-        return Material("glass", ior=table.number("ior", 1.5, above=0.0), abbe=abbe)
+        abbe = table.number("abbe", above=0.0, at_most=COUNT) if table.has("abbe") else None
+        return Material("glass", ior=table.number("ior", 1.5, above=0.0, at_most=COUNT), abbe=abbe)
     return Material("diffuse" if kind == "diffuse" else "unlit")
 
 
@@ -138,7 +143,7 @@ def _read_motion(table: Table) -> Motion:
         spin = Spin(
             turning.direction("axis", (0.0, 0.0, 1.0)),
             turning.vector("center", (0.0, 0.0, 0.0)),
-            turning.number("rev_per_s"),
+            turning.number("rev_per_s", at_least=-COUNT, at_most=COUNT),
         )
     return Motion(table.vector("velocity", (0.0, 0.0, 0.0)), spin)
 

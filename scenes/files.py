@@ -7,19 +7,32 @@ what is allowed, before any renderer sees it.
 import math
 import re
 import tomllib
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
 from aliasbench.scenes.catalog import SCENES, build_scene
-from aliasbench.scenes.errors import InputError, NotAvailableError, unknown_name
+from aliasbench.scenes.errors import InputError, NotAvailableError, shortened, unknown_name
 from aliasbench.scenes.facts import read_facts
 from aliasbench.scenes.file_objects import read_light, read_object, read_textures
-from aliasbench.scenes.model import Animation, Camera, Scene
+from aliasbench.scenes.limits import (
+    COUNT,
+    LENGTH,
+    MIN_FOV_DEG,
+    MIN_FPS,
+    MIN_LENGTH,
+    RADIANCE,
+    camera_fault,
+    end_of,
+    reach_fault,
+)
+from aliasbench.scenes.model import Animation, Camera, Scene, Surface, Texture
 from aliasbench.scenes.projection import view_at
 from aliasbench.scenes.schema import Table
 
 SCHEMA = 1
+MAX_NAME = 200  # characters of a scene's name: it is shown in tables and stands in records
 MODEL_SUFFIXES = (".glb", ".gltf", ".obj", ".ply")
 _ROOT = ("schema", "name", "background", "contrast", "animation", "camera", "object", "texture", "light", "fact")
 _CAMERA = (
@@ -43,7 +56,11 @@ def load_scene(text: str) -> Scene:
         If there is no such scene, or the file or a parameter is wrong.
     NotAvailableError
         For meshes, which this version does not read.
+    TypeError
+        If `text` is none.
     """
+    if not isinstance(text, str):
+        raise TypeError(f"a scene is named by a text (of the catalog, or a file's path), not by {type(text).__name__}")
     given = text.strip()
     path = Path(given)
     if path.suffix.lower() in MODEL_SUFFIXES:
@@ -71,15 +88,18 @@ def read_scene_file(path: Path) -> Scene:
     animation = _read_animation(root.table("animation"))
     camera = _read_camera(root.table("camera"), animation)
     textures = read_textures(root.table("texture"), path.parent)
-    objects = tuple(read_object(t, textures) for t in root.tables("object"))
+    objects = tuple(_read_object(t, textures, camera, animation) for t in root.tables("object"))
+    name = root.text("name", path.stem)
+    if len(name) > MAX_NAME or not name.isprintable():
+        root.refuse("name", f"a text of printable characters, at most {MAX_NAME}")
     return Scene(
-        name=root.text("name", path.stem),
+        name=name,
         camera=camera,
         objects=objects,
         textures=textures,
         lights=tuple(read_light(t) for t in root.tables("light")),
         background=root.color("background", (0.0, 0.0, 0.0)),
-        contrast=root.number("contrast", 1.0, above=0.0),
+        contrast=root.number("contrast", 1.0, at_least=1 / RADIANCE, at_most=RADIANCE),
         animation=animation,
         facts=read_facts(root.table("fact"), objects, camera),
     )
@@ -95,7 +115,8 @@ def _is_file(path: Path) -> bool:
 def _parse(path: Path) -> dict[str, object]:
     file = str(path)
     try:
-        text = path.read_bytes().decode("utf-8")
+        # Some editors open a text in UTF-8 with a byte order mark, which says nothing.
+        text = path.read_bytes().decode("utf-8").removeprefix("\ufeff")
     except UnicodeDecodeError as error:
         raise InputError(f"{file}: byte {error.start} is not UTF-8; a scene file is a TOML text in UTF-8") from error
     except (OSError, ValueError) as error:
@@ -111,7 +132,14 @@ def _parse(path: Path) -> dict[str, object]:
             # Only the end of the document is reported without a place.
             what = str(error).removesuffix(" (at end of document)")
             line, column = text.count("\n") + 1, len(text) - (text.rfind("\n") + 1) + 1
-        raise InputError(f"{file}: line {line}, column {column}: not valid TOML: {what}") from error
+        raise InputError(f"{file}: line {line}, column {column}: not valid TOML: {shortened(what)}") from error
+    except ValueError as error:
+        # What Python says of an integer with more decimal digits than it converts.
+        number = re.search(r"\d(_?\d){999}", text)
+        line = text.count("\n", 0, number.start()) + 1 if number else 1
+        raise InputError(
+            f"{file}: line {line}: a number of thousands of digits; at most {LENGTH:g} is of use"
+        ) from error
     except RecursionError as error:
         raise InputError(f"{file}: nested too deeply to be a scene file") from error
 
@@ -119,7 +147,7 @@ def _parse(path: Path) -> dict[str, object]:
 def _read_animation(table: Table) -> Animation:
     table.check_keys(("fps", "frames", "shutter"))
     return Animation(
-        fps=table.number("fps", 30.0, above=0.0),
+        fps=table.number("fps", 30.0, at_least=MIN_FPS, at_most=COUNT),
         frames=table.whole("frames", 1, at_least=1),
         shutter=table.number("shutter", 0.0, at_least=0.0, at_most=1.0),
     )
@@ -136,24 +164,36 @@ def _read_camera(table: Table, animation: Animation) -> Camera:
         position=table.vector("position", (0.0, 0.0, 5.0)),
         target=table.vector("target", (0.0, 0.0, 0.0)),
         up=table.direction("up", (0.0, 1.0, 0.0)),
-        height=table.number("height", 2.0, above=0.0) if flat else None,
-        fov_y_deg=None if flat else table.number("fov_y_deg", above=0.0, below=180.0),
+        height=table.number("height", 2.0, at_least=MIN_LENGTH, at_most=LENGTH) if flat else None,
+        fov_y_deg=None if flat else table.number("fov_y_deg", at_least=MIN_FOV_DEG, below=180.0),
         velocity=table.vector("velocity", (0.0, 0.0, 0.0)),
         target_velocity=table.vector("target_velocity") if table.has("target_velocity") else None,
-        lens_radius=table.number("lens_radius", 0.0, at_least=0.0),
-        focus_distance=table.number("focus_distance", above=0.0) if table.has("focus_distance") else None,
+        lens_radius=table.number("lens_radius", 0.0, at_least=0.0, at_most=LENGTH),
+        focus_distance=(
+            table.number("focus_distance", at_least=MIN_LENGTH, at_most=LENGTH) if table.has("focus_distance") else None
+        ),
     )
     for t in _critical_times(camera, animation):
         try:
             view_at(camera, animation, 0, t * animation.fps, (2, 2))
         except InputError as error:
             raise InputError(f"{table.file}: {error}") from error
+    if (fault := camera_fault(camera, animation)) is not None:
+        table.refuse(*fault)
     return camera
+
+
+def _read_object(table: Table, textures: Mapping[str, Texture], camera: Camera, animation: Animation) -> Surface:
+    surface = read_object(table, textures)
+    if (fault := reach_fault(surface, camera, animation)) is not None:
+        key, allowed = fault
+        table.refuse(next(k for k in ("polygon", "quad") if table.has(k)) if key == "shape" else key, allowed)
+    return surface
 
 
 def _critical_times(camera: Camera, animation: Animation) -> list[float]:
     """Return the times of the animation at which the camera can be degenerate: its ends, and where it comes nearest."""
-    end = (animation.frames - 1 + animation.shutter) / animation.fps
+    end = end_of(animation)
     axis = np.array(camera.target) - np.array(camera.position)
     drift = np.array(camera.target_velocity or camera.velocity) - np.array(camera.velocity)
     up = np.array(camera.up) / math.hypot(*camera.up)

@@ -6,16 +6,19 @@ whole number where a real one is meant (a bool is neither), and no key is ignore
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NoReturn
 
 import numpy as np
 
-from aliasbench.scenes.errors import InputError, unknown_name
+from aliasbench.scenes.errors import SHOWN, InputError, shortened, unknown_name
+from aliasbench.scenes.limits import LENGTH, MIN_LENGTH, RADIANCE
 from aliasbench.scenes.model import FloatArray, Vec3
 
-_SHOWN = 60  # characters of a value in a message
+_DECIMAL_BITS = 10_000  # longer integers Python may refuse to write in decimal; it never does in hexadecimal
+_BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +44,8 @@ class Table:
 
     def where(self, key: str) -> str:
         """Return the key's path in the file."""
-        return f"{self.path}.{key}" if self.path else key
+        written = shortened(key) if _BARE_KEY.fullmatch(key) else shown(key)
+        return f"{self.path}.{written}" if self.path else written
 
     def refuse(self, key: str, allowed: str) -> NoReturn:
         """Raise the error for a key's value (or its absence), saying what is allowed."""
@@ -111,41 +115,42 @@ class Table:
             raise InputError(f"{self.file}: {self.where(key)} = {shown(value)}: {problem}")
         return value
 
-    def numbers(self, key: str, count: int) -> tuple[float, ...]:
-        """Return exactly `count` finite numbers."""
-        numbers = _finite_list(self.values.get(key), count)
+    def numbers(self, key: str, count: int, limit: float) -> tuple[float, ...]:
+        """Return exactly `count` numbers from -limit to limit."""
+        numbers = _finite_list(self.values.get(key), count, limit)
         if numbers is None:
-            self.refuse(key, f"a list of {count} finite numbers")
+            self.refuse(key, f"a list of {count} finite numbers{_between(limit)}")
         return numbers
 
-    def vector(self, key: str, default: Vec3 | None = None) -> Vec3:
-        """Return three finite numbers."""
+    def vector(self, key: str, default: Vec3 | None = None, *, limit: float = LENGTH) -> Vec3:
+        """Return three numbers from -limit to limit."""
         if default is not None and key not in self.values:
             return default
-        x, y, z = self.numbers(key, 3)
+        x, y, z = self.numbers(key, 3, limit)
         return (x, y, z)
 
     def direction(self, key: str, default: Vec3 | None = None) -> Vec3:
         """Return three finite numbers, not all zero."""
         vector = self.vector(key, default)
-        if not any(vector):
-            self.refuse(key, "a direction: three finite numbers, not all zero")
+        if math.hypot(*vector) < MIN_LENGTH:
+            self.refuse(key, f"a direction: three finite numbers, not all zero (at least {MIN_LENGTH:g} long)")
         return vector
 
     def color(self, key: str, default: Vec3 | None = None) -> Vec3:
-        """Return linear RGB, each component finite and at least 0."""
-        color = self.vector(key, default)
-        if min(color) < 0.0:
-            self.refuse(key, "linear RGB, three finite numbers of at least 0")
+        """Return linear RGB, each component at least 0 and at most `limits.RADIANCE`."""
+        color = self.vector(key, default, limit=math.inf)
+        if not 0.0 <= min(color) <= max(color) <= RADIANCE:
+            self.refuse(key, f"linear RGB, three finite numbers from 0 to {RADIANCE:g}")
         return color
 
-    def points(self, key: str, width: int, count: int | None = None) -> FloatArray:
-        """Return a list of `count` (or any number of) points as (n, width) float64."""
+    def points(self, key: str, width: int, count: int | None = None, *, limit: float = LENGTH) -> FloatArray:
+        """Return a list of `count` (or any number of) points as (n, width) float64, all from -limit to limit."""
         value = self.values.get(key)
-        rows = [_finite_list(row, width) for row in value] if isinstance(value, list) else []
+        rows = [_finite_list(row, width, limit) for row in value] if isinstance(value, list) else []
         complete = [row for row in rows if row is not None]
         if not rows or len(complete) < len(rows) or count not in (None, len(rows)):
-            self.refuse(key, f"a list of {f'{count} ' if count else ''}points of {width} finite numbers each")
+            many = f"{count} " if count else ""
+            self.refuse(key, f"a list of {many}points of {width} finite numbers each{_between(limit)}")
         return np.array(complete, dtype=np.float64)
 
     def table(self, key: str) -> "Table":
@@ -165,8 +170,41 @@ class Table:
 
 def shown(value: object) -> str:
     """Return a value as the file would write it, shortened where it is long."""
-    text = json.dumps(value, default=str, ensure_ascii=False)
-    return text if len(text) <= _SHOWN else text[: _SHOWN - 3] + "..."
+    # Written only as far as it is shown: the rest may be nested deeper than Python recurses.
+    text = ""
+    for piece in _pieces(value):
+        text += piece
+        if len(text) > SHOWN:
+            break
+    return shortened(text)
+
+
+def _pieces(value: object) -> Iterator[str]:
+    """Yield a value of the file in JSON's notation, piece by piece; control characters as escapes."""
+    if isinstance(value, dict):
+        yield "{"
+        for k, (key, item) in enumerate(value.items()):
+            yield ", " if k else ""
+            yield from _pieces(key)
+            yield ": "
+            yield from _pieces(item)
+        yield "}"
+    elif isinstance(value, list):
+        yield "["
+        for k, item in enumerate(value):
+            yield ", " if k else ""
+            yield from _pieces(item)
+        yield "]"
+    elif isinstance(value, int) and value.bit_length() > _DECIMAL_BITS:
+        yield hex(value)
+    else:
+        text = value[: SHOWN + 1] if isinstance(value, str) else value
+        written = json.dumps(text, default=str, ensure_ascii=False)
+        yield "".join(c if c.isprintable() else json.dumps(c)[1:-1] for c in written)
+
+
+def _between(limit: float) -> str:
+    return f" from {-limit:g} to {limit:g}" if math.isfinite(limit) else ""
 
 
 def _finite(value: object) -> float | None:
@@ -179,8 +217,8 @@ def _finite(value: object) -> float | None:
     return number if math.isfinite(number) else None
 
 
-def _finite_list(value: object, count: int) -> tuple[float, ...] | None:
+def _finite_list(value: object, count: int, limit: float) -> tuple[float, ...] | None:
     if not isinstance(value, list) or len(value) != count:
         return None
-    numbers = tuple(number for number in map(_finite, value) if number is not None)
+    numbers = tuple(number for number in map(_finite, value) if number is not None and abs(number) <= limit)
     return numbers if len(numbers) == count else None

@@ -12,7 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aliasbench.scenes.errors import InputError
+from aliasbench.scenes.limits import RADIANCE
 from aliasbench.scenes.model import Checker, FloatArray, Grating, ImageTexture, Texture, read_only
+from aliasbench.scenes.stderr import silenced_stderr
 
 TexelArray = NDArray[np.float32]
 BAKED_SIZE = 64  # texels across a baked period: a checker is exact at any even size
@@ -39,23 +41,28 @@ def load_image(path: Path, *, alpha_cutoff: float | None = None, source: str | N
     Raises
     ------
     InputError
-        If the file is missing, cannot be read, has no pixels, or has a value that is not finite.
+        If the file is missing or not a regular one, cannot be read, has no pixels, or has a value that is not finite or
+        over `limits.RADIANCE`.
     """
     import OpenImageIO as oiio
 
-    if not path.is_file():
-        raise InputError(f"image {str(path)!r}: no such file")
-    image = oiio.ImageInput.open(str(path))
-    if image is None:
-        raise InputError(f"image {str(path)!r}: cannot be read ({oiio.geterror().strip()})")
     try:
-        spec = image.spec()
-        is_float = spec.format.basetype in (oiio.HALF, oiio.FLOAT, oiio.DOUBLE)
-        pixels = image.read_image(0, 0, 0, min(spec.nchannels, 4), oiio.FLOAT)
-        if pixels is None or pixels.size == 0:
-            raise InputError(f"image {str(path)!r}: cannot be read ({image.geterror().strip()})")
-    finally:
-        image.close()
+        if not path.is_file():
+            raise InputError(f"image {str(path)!r}: {'not a regular file' if path.exists() else 'no such file'}")
+    except OSError as error:
+        raise InputError(f"image {str(path)!r}: cannot be read ({error.strerror})") from error
+    with silenced_stderr():
+        image = oiio.ImageInput.open(str(path))
+        if image is None:
+            raise InputError(f"image {str(path)!r}: cannot be read ({_first_line(oiio.geterror())})")
+        try:
+            spec = image.spec()
+            is_float = spec.format.basetype in (oiio.HALF, oiio.FLOAT, oiio.DOUBLE)
+            pixels = image.read_image(0, 0, 0, min(spec.nchannels, 4), oiio.FLOAT)
+            if pixels is None or pixels.size == 0:
+                raise InputError(f"image {str(path)!r}: cannot be read ({_first_line(image.geterror())})")
+        finally:
+            image.close()
     data = np.asarray(pixels, dtype=np.float64).reshape(spec.height, spec.width, -1)
     color = data[..., : 1 if data.shape[2] < 3 else 3]
     alpha = data[..., -1:] if data.shape[2] in (2, 4) else np.ones_like(data[..., :1])
@@ -64,7 +71,15 @@ def load_image(path: Path, *, alpha_cutoff: float | None = None, source: str | N
     texels = np.concatenate([np.broadcast_to(color, (*color.shape[:2], 3)), alpha], axis=2)
     if not np.isfinite(texels).all():
         raise InputError(f"image {str(path)!r}: has values that are not finite")
+    if (largest := float(np.abs(texels).max())) > RADIANCE:
+        raise InputError(f"image {str(path)!r}: has a value of {largest:g}; at most {RADIANCE:g} is allowed")
     return ImageTexture(read_only(texels[::-1].astype(np.float32)), alpha_cutoff, source or str(path))
+
+
+def _first_line(errors: str) -> str:
+    """Return the first of an image library's errors: what follows says the same less plainly."""
+    lines = [line.strip() for line in errors.splitlines() if line.strip()]
+    return lines[0] if lines else "no image of a known format"
 
 
 def evaluate_point(texture: Texture, uv: FloatArray) -> FloatArray:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 
 import moderngl
 import numpy as np
+from numpy.typing import NDArray
 
 from aliasbench.renderers.technique import Technique
 from aliasbench.scenes.errors import InputError
@@ -124,4 +125,16 @@ def shader_coordinates(shading: Shading, uv: FloatArray) -> FloatArray:
     out: FloatArray = uv @ shading.uv_matrix[:, :2].T + shading.uv_matrix[:, 2]
     if shading.periodic and len(out):
         out = out - np.round(out.mean(axis=0))
+    return out
+
+
+def piece_coordinates(shading: Shading, uv: FloatArray, nearest: NDArray[np.int64]) -> FloatArray:
+    """Return (m, 3, 2) float64 texture coordinates of triangles for a shading.
+
+    As `shader_coordinates`, but of each triangle the whole part at its nearest corner is taken off: there the pixels
+    resolve the texture, however far away the other corners are.
+    """
+    out: FloatArray = uv @ shading.uv_matrix[:, :2].T + shading.uv_matrix[:, 2]
+    if shading.periodic:
+        out = out - np.round(np.take_along_axis(out, nearest[:, None, None], axis=1))
     return out

@@ -13,7 +13,15 @@ from numpy.typing import NDArray
 
 from aliasbench.renderers.geometry import Body
 from aliasbench.renderers.raster.graphics import GraphicsContext, read_shader
-from aliasbench.renderers.raster.minification import KINDS, MODES, Shading, make_shading, shader_coordinates
+from aliasbench.renderers.raster.guard import BoolArray, Pieces
+from aliasbench.renderers.raster.minification import (
+    KINDS,
+    MODES,
+    Shading,
+    make_shading,
+    piece_coordinates,
+    shader_coordinates,
+)
 from aliasbench.renderers.raster.projection import pack_matrices
 from aliasbench.renderers.technique import Technique
 from aliasbench.scenes.errors import InputError
@@ -25,11 +33,13 @@ _VERTEX = np.dtype([("position", "3f4"), ("texcoord", "2f4"), ("color", "3f4"), 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Batch:
-    """The triangles with one texture."""
+    """The triangles with one texture, (m, 3) vertex numbers in `triangles`, and the object of each in `owners`."""
 
     array: moderngl.VertexArray
     index: moderngl.Buffer
     shading: Shading
+    triangles: NDArray[np.int32]
+    owners: NDArray[np.int32]
 
 
 def _shader(name: str, shading: Shading) -> str:
@@ -53,35 +63,46 @@ class SceneBuffers:
         vertices, triangles, surfaces = _gather(scene, bodies, [shadings[n] for n in texture_names])
         self._vertices = gl.buffer(vertices.tobytes()) if len(vertices) else None
         self._batches: list[_Batch] = []
+        self._colors = np.array([s.color for s in scene.objects]).reshape(-1, 3)
+        self._left_out = np.zeros(len(scene.objects), dtype=bool)
         for name, shading in shadings.items():
             chosen = np.array([n == name for n in texture_names], dtype=bool)[surfaces]
             if chosen.any():
-                self._batches.append(self._make_batch(triangles[chosen], shading))
+                self._batches.append(self._make_batch(triangles[chosen], surfaces[chosen], shading))
         self._shadings = tuple(shadings.values())
-        rows = max(1, -(-len(bodies) // BODIES_PER_ROW))
+        # one more matrix than bodies: that of the pieces
+        count = len(bodies) + 1
+        rows = -(-count // BODIES_PER_ROW)
         if rows > context.max_texture_size:
             raise InputError(f"{len(bodies)} bodies: this device takes {context.max_texture_size * BODIES_PER_ROW}")
-        self._matrices = gl.texture((4 * min(len(bodies) or 1, BODIES_PER_ROW), rows), 4, dtype="f4")
+        self._row_length = min(count, BODIES_PER_ROW)
+        self._matrices = gl.texture((4 * self._row_length, rows), 4, dtype="f4")
         self._matrices.filter = (moderngl.NEAREST, moderngl.NEAREST)
-        self._row_length = min(len(bodies) or 1, BODIES_PER_ROW)
 
-    def _make_batch(self, triangles: NDArray[np.int32], shading: Shading) -> _Batch:
-        gl = self._context.gl
+    def _make_batch(self, triangles: NDArray[np.int32], owners: NDArray[np.int32], shading: Shading) -> _Batch:
         program = self._context.program(_shader("scene.vert.glsl", shading), _shader("scene.frag.glsl", shading))
-        index = gl.buffer(np.ascontiguousarray(triangles).tobytes())
+        index = self._context.gl.buffer(np.ascontiguousarray(triangles).tobytes())
+        array = self._make_array(program, self._vertices, index)
+        return _Batch(array, index, shading, triangles, owners)
+
+    def _make_array(
+        self, program: moderngl.Program, vertices: moderngl.Buffer | None, index: moderngl.Buffer | None
+    ) -> moderngl.VertexArray:
         # names the shader does not use are left out of a linked program
         used = [n if n in program else None for n in _VERTEX.names or ()]
         sizes = {"position": "3f4", "texcoord": "2f4", "color": "3f4", "body": "1i4"}
         padding = {"3f4": "12x", "2f4": "8x", "1i4": "4x"}
         layout = " ".join(sizes[n] if u else padding[sizes[n]] for n, u in zip(sizes, used, strict=True))
-        array = gl.vertex_array(program, [(self._vertices, layout, *(u for u in used if u))], index)
-        return _Batch(array, index, shading)
+        return self._context.gl.vertex_array(program, [(vertices, layout, *(u for u in used if u))], index)
 
-    def draw(self, matrices: FloatArray) -> None:
-        """Draw every body with its matrix (n, 4, 4) into the bound target."""
+    def draw(self, matrices: FloatArray, pieces: Pieces | None = None, far: BoolArray | None = None) -> None:
+        """Draw into the bound target every body with its matrix (n, 4, 4), the far objects as pieces instead."""
         if not self._batches:
             return
-        self._matrices.write(pack_matrices(matrices, self._row_length).tobytes())
+        self._leave_out(far)
+        if pieces is not None:
+            matrices = np.concatenate([matrices, pieces.matrix[None]])
+        self._matrices.write(pack_matrices(matrices, self._row_length, self._matrices.height).tobytes())
         self._matrices.use(0)
         for batch in self._batches:
             program = batch.array.program
@@ -91,7 +112,34 @@ class SceneBuffers:
                     program[name] = value
             if batch.shading.image is not None:
                 batch.shading.image.use(1)
-            batch.array.render(moderngl.TRIANGLES)
+            count = len(batch.triangles) if far is None else int(np.count_nonzero(~far[batch.owners]))
+            if count:
+                batch.array.render(moderngl.TRIANGLES, vertices=3 * count)
+            if pieces is not None:
+                self._draw_pieces(batch, pieces, body=len(matrices) - 1)
+
+    def _leave_out(self, far: BoolArray | None) -> None:
+        """Make the index buffers those of all objects but the far ones."""
+        wanted = np.zeros_like(self._left_out) if far is None else far
+        if np.array_equal(wanted, self._left_out):
+            return
+        for batch in self._batches:
+            batch.index.write(np.ascontiguousarray(batch.triangles[~wanted[batch.owners]]).tobytes())
+        self._left_out = wanted.copy()
+
+    def _draw_pieces(self, batch: _Batch, pieces: Pieces, body: int) -> None:
+        chosen = np.isin(pieces.surfaces, batch.owners)
+        if not chosen.any():
+            return
+        vertices = np.zeros((int(chosen.sum()), 3), _VERTEX)
+        vertices["position"], vertices["body"] = pieces.corners[chosen], body
+        vertices["color"] = self._colors[pieces.surfaces[chosen]][:, None]
+        vertices["texcoord"] = piece_coordinates(batch.shading, pieces.uv[chosen], pieces.nearest[chosen])
+        buffer = self._context.gl.buffer(vertices.tobytes())
+        array = self._make_array(batch.array.program, buffer, None)
+        array.render(moderngl.TRIANGLES)
+        array.release()
+        buffer.release()
 
     def release(self) -> None:
         """Free everything on the device (programs are the context's and stay)."""

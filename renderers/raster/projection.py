@@ -16,11 +16,16 @@ from numpy.typing import NDArray
 
 from aliasbench.renderers.geometry import LAYER_STEP
 from aliasbench.renderers.raster.placement import Placement, body_matrices
+from aliasbench.scenes.errors import InputError
 from aliasbench.scenes.model import Camera, FloatArray, Scene
 from aliasbench.scenes.projection import View, view_at
 
 # near in units of the farthest point: small enough to cut nothing, and far from float32's smallest numbers
-_NEAR = 2.0**-24
+_NEAR = 2.0**-64
+# world units; a scene that is a single point still needs a unit of depth
+_LEAST_DISTANT = 2.0**-100
+# world units; beyond, products of lengths and scales leave float32 (2^127) even after cutting
+MOST_DISTANT = 2.0**100
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,12 +63,43 @@ def clip_matrices(
         In pixels, right and down: what is drawn at a pixel's centre is the picture at the centre plus the jitter.
     margin : int
         Pixels that the target is larger than the picture, on each side.
+
+    Raises
+    ------
+    InputError
+        If something is so far away, or the picture so small a part of the world, that float32 cannot hold it.
     """
+    # what overflows is refused below
+    with np.errstate(over="ignore", invalid="ignore"):
+        out, farthest = _compose(scene, placement, size, frame, fraction, jitter, margin)
+    if not farthest <= MOST_DISTANT:
+        raise InputError(
+            f"frame {frame}: the scene reaches {farthest:.3g} world units from the camera; "
+            f"the rasterizer draws up to {MOST_DISTANT:.3g}"
+        )
+    if not np.isfinite(out).all() or np.abs(out).max(initial=0.0) > MOST_DISTANT**2:
+        raise InputError(
+            f"frame {frame}: the scene reaches {farthest:.3g} world units from the camera, "
+            "too many pictures wide for the rasterizer; use a larger height or fov_y_deg"
+        )
+    return out
+
+
+def _compose(
+    scene: Scene,
+    placement: Placement,
+    size: tuple[int, int],
+    frame: int,
+    fraction: float,
+    jitter: tuple[float, float],
+    margin: int,
+) -> tuple[FloatArray, float]:
+    """Return the matrices of `clip_matrices` and the farthest that anything may be from the camera."""
     view = view_at(scene.camera, scene.animation, frame, fraction, size)
     local = body_matrices(placement, scene.animation, frame, fraction, view.origin)
     # Frobenius norm: no direction is stretched by more
     reach = np.linalg.norm(local[:, :3, 3], axis=1) + placement.radii * np.linalg.norm(local[:, :3, :3], axis=(1, 2))
-    farthest = float(reach.max(initial=0.0)) or 1.0
+    farthest = max(float(reach.max(initial=0.0)), _LEAST_DISTANT)
     camera = np.eye(4)
     camera[:3, :3] = np.stack([view.right, view.up, view.forward])
     clip = np.repeat((_projection(view, farthest, jitter, margin) @ camera)[None], len(local), axis=0)
@@ -71,7 +107,7 @@ def clip_matrices(
     closer = 1.0 - LAYER_STEP * placement.layers
     clip[:, 2] *= (1.0 / closer if view.perspective else closer)[:, None]
     out: FloatArray = clip @ local
-    return out
+    return out, farthest
 
 
 def _projection(view: View, farthest: float, jitter: tuple[float, float], margin: int) -> FloatArray:
@@ -86,9 +122,8 @@ def _projection(view: View, farthest: float, jitter: tuple[float, float], margin
     return np.array([[sx, 0, 0, jx], [0, sy, 0, jy], [0, 0, 1 / (1.01 * farthest), 0], [0, 0, 0, 1]])
 
 
-def pack_matrices(matrices: FloatArray, row_length: int) -> NDArray[np.float32]:
+def pack_matrices(matrices: FloatArray, row_length: int, rows: int) -> NDArray[np.float32]:
     """Return (rows, 4 * row_length, 4) float32: the columns of every matrix, `row_length` matrices a row."""
-    rows = max(1, -(-len(matrices) // row_length))
     out = np.zeros((rows * row_length, 4, 4), np.float32)
     out[: len(matrices)] = matrices.transpose(0, 2, 1)
     return out.reshape(rows, 4 * row_length, 4)

@@ -13,19 +13,20 @@ from types import TracebackType
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from aliasbench.renderers.frame import Frame
 from aliasbench.renderers.geometry import build_bodies
 from aliasbench.renderers.raster.context import acquire_context, check_samples
 from aliasbench.renderers.raster.graphics import GraphicsContext
+from aliasbench.renderers.raster.guard import Guard
 from aliasbench.renderers.raster.pipeline import SceneBuffers
 from aliasbench.renderers.raster.placement import make_placement
-from aliasbench.renderers.raster.projection import clip_matrices, depth_rule
+from aliasbench.renderers.raster.projection import MOST_DISTANT, clip_matrices, depth_rule
 from aliasbench.renderers.raster.targets import Target
 from aliasbench.renderers.sampling.patterns import pattern_frame, sample_set, sampler_code
 from aliasbench.renderers.technique import Technique
-from aliasbench.scenes.errors import NotAvailableError
+from aliasbench.scenes.errors import InputError, NotAvailableError
 from aliasbench.scenes.model import Scene
 from aliasbench.scenes.motion import shutter_fraction
 
@@ -38,11 +39,13 @@ def prepare_raster(scene: Scene, technique: Technique, size: tuple[int, int]) ->
     NotAvailableError
         For a documented feature that the rasterizer does not have yet.
     InputError
-        If the device lacks the hardware samples asked for, or cannot hold a picture of this size.
+        If the device lacks the hardware samples asked for or cannot hold a picture of this size, or a number of the
+        scene is beyond 32-bit graphics.
     NoContextError
         If there is no OpenGL here; the message lists what was tried.
     """
     _check_available(scene, technique)
+    _check_range(scene)
     start = perf_counter()
     context = acquire_context(technique.backend, technique.device)
     check_samples(context, technique.msaa)
@@ -71,6 +74,31 @@ def _check_available(scene: Scene, technique: Technique) -> None:
     sampler_code(technique.sampler)
 
 
+def _check_range(scene: Scene) -> None:
+    """Raise InputError for numbers that 32-bit graphics cannot hold."""
+    rows: list[tuple[str, ArrayLike]] = [
+        ("camera position", scene.camera.position),
+        ("camera target", scene.camera.target),
+        ("background", scene.background),
+    ]
+    for index, surface in enumerate(scene.objects):
+        which = f"object {index}" + (f" ({surface.name})" if surface.name else "")
+        spin = surface.motion.spin
+        rows += [
+            (f"{which}: vertices", surface.vertices),
+            (f"{which}: color", surface.color),
+            (f"{which}: uv", () if surface.uv is None else surface.uv),
+            (f"{which}: spin center", () if spin is None else spin.center),
+            (f"{which}: matrices", surface.motion.matrices or ()),
+        ]
+    for what, values in rows:
+        largest = float(np.abs(np.asarray(values, dtype=np.float64)).max(initial=0.0))
+        if not largest <= MOST_DISTANT:
+            raise InputError(
+                f"{what}: {largest:.3g} is too large for the rasterizer, which takes up to {MOST_DISTANT:.3g}"
+            )
+
+
 def _leave(context: GraphicsContext, *releases: Callable[[], None]) -> None:
     for release in releases:
         context.release_later(release)
@@ -85,6 +113,7 @@ class RasterScene:
         self._context, self._scene, self._technique, self._size = context, scene, technique, size
         bodies = build_bodies(scene)
         self._placement = make_placement(bodies)
+        self._guard = Guard(scene, self._placement, size)
         with context.use() as gl, ExitStack() as made:
             context.release_left_over()
             self._target = Target(context, size, technique, depth_rule(scene.camera))
@@ -107,15 +136,20 @@ class RasterScene:
         ------
         GraphicsError
             If OpenGL reports an error.
+        InputError
+            If the scene reaches farther from the camera in that frame than float32 can hold.
+        RuntimeError
+            If the prepared scene is closed.
         """
-        if not self._forgotten.alive:
-            raise RuntimeError("this prepared scene is closed")
         start = perf_counter()
         t = self._technique
         passes = sample_set(t.sampler, t.passes, seed=seed, frame=pattern_frame(t.reseed, frame))
         pixels = np.empty((self._size[1], self._size[0], 3), np.float32)
         total = np.zeros(pixels.shape) if t.passes > 1 else None
         with self._context.use():
+            # asked inside, since another thread may close it meanwhile
+            if not self._forgotten.alive:
+                raise RuntimeError("this prepared scene is closed; prepare it again to render")
             for x, y, time, *_ in passes:
                 self._draw_pass(frame, 0.5 if t.time == "center" else time, (x - 0.5, y - 0.5), pixels)
                 if total is not None:
@@ -137,14 +171,18 @@ class RasterScene:
             jitter=jitter,
             margin=self._target.margin,
         )
+        far = self._guard.far_objects(matrices)
         self._target.begin(self._scene.background)
-        self._buffers.draw(matrices)
+        if far.any():
+            self._buffers.draw(matrices, self._guard.cut(matrices, far), far)
+        else:
+            self._buffers.draw(matrices)
         self._target.read_into(pixels, jitter)
 
     def close(self) -> None:
         """Free what the scene holds on the device; a second call does nothing."""
-        if self._forgotten.detach() is not None:
-            with self._context.use():
+        with self._context.use():
+            if self._forgotten.detach() is not None:
                 self._buffers.release()
                 self._target.release()
 

@@ -11,17 +11,21 @@ Supersampling draws a picture k times as wide and high, whose pixels play the pa
 averages k x k of them on the device.
 """
 
+from contextlib import ExitStack
 from typing import Any, Protocol
 
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from aliasbench.renderers.raster.graphics import DEPTH32F, GraphicsContext, read_shader
+from aliasbench.renderers.raster.graphics import DEPTH32F, GraphicsContext, GraphicsError, read_shader
 from aliasbench.renderers.raster.projection import DepthRule
 from aliasbench.renderers.technique import Technique
 from aliasbench.scenes.errors import InputError
 from aliasbench.scenes.model import FloatArray
+
+# 32-bit RGBA and depth
+_BYTES_PER_SAMPLE = 20
 
 
 def wrapped_positions(positions: FloatArray, jitter: tuple[float, float]) -> tuple[FloatArray, NDArray[np.int32]]:
@@ -59,17 +63,35 @@ class Target:
             larger = f" with ssaa={technique.ssaa}" if technique.ssaa > 1 else ""
             most = limit // technique.ssaa - 2 * self.margin
             raise InputError(f"size {size[0]}x{size[1]}{larger}: this device ({context.renderer}) draws at most {most}")
-        self._surface = _Surface(context, full, samples, rule)
         self._stages: list[_Stage] = []
+        with ExitStack() as made:
+            try:
+                self._surface = _Surface(context, full, samples, rule, made)
+                self._add_stages(context, size, technique, made)
+                context.check("making the targets")
+            except (moderngl.Error, GraphicsError) as error:
+                # what a driver says of lacking memory: an incomplete framebuffer, or an error of its own
+                context.gl.clear_errors()
+                taken = full[0] * full[1] * samples * _BYTES_PER_SAMPLE / 2**30
+                raise InputError(
+                    f"size {size[0]}x{size[1]}: this device ({context.renderer}) cannot hold {samples} sample"
+                    f"{'s'[: samples > 1]} a pixel of {full[0]}x{full[1]} pixels ({taken:.1f} GiB: {error}); "
+                    f"choose a smaller size{' or msaa' * (samples > 1)}{' or ssaa' * (technique.ssaa > 1)}"
+                ) from None
+            made.pop_all()
+
+    def _add_stages(
+        self, context: GraphicsContext, size: tuple[int, int], technique: Technique, made: ExitStack
+    ) -> None:
+        samples = technique.msaa
         if self.margin:
-            self._stages.append(_Gather(context, self._surface, self.size, samples, self.margin))
+            self._stages.append(_Gather(context, self._surface, self.size, samples, self.margin, made))
         elif samples > 1:
-            self._stages.append(_Resolve(context, self._surface, self.size))
+            self._stages.append(_Resolve(context, self._surface, self.size, made))
         if technique.ssaa > 1:
             source = self._stages[-1].output if self._stages else self._surface
-            self._stages.append(_Reduce(context, source, size, technique.ssaa))
+            self._stages.append(_Reduce(context, source, size, technique.ssaa, made))
         self._last = self._stages[-1].output if self._stages else self._surface
-        context.check("making the targets")
 
     def begin(self, background: tuple[float, float, float]) -> None:
         """Clear the target and make it the one drawn to."""
@@ -89,11 +111,13 @@ class Target:
 
 
 class _Image:
-    """A picture of one sample a pixel."""
+    """A picture of one sample a pixel; `made` frees what there is already when the rest cannot be made."""
 
-    def __init__(self, context: GraphicsContext, size: tuple[int, int]) -> None:
+    def __init__(self, context: GraphicsContext, size: tuple[int, int], made: ExitStack) -> None:
         self.color: Any = context.gl.texture(size, 4, dtype="f4")
+        made.callback(self.color.release)
         self.framebuffer = context.gl.framebuffer([self.color])
+        made.callback(self.framebuffer.release)
 
     def release(self) -> None:
         self.framebuffer.release()
@@ -103,15 +127,20 @@ class _Image:
 class _Surface(_Image):
     """Colour and depth of one size and number of samples."""
 
-    def __init__(self, context: GraphicsContext, size: tuple[int, int], samples: int, rule: DepthRule) -> None:
+    def __init__(
+        self, context: GraphicsContext, size: tuple[int, int], samples: int, rule: DepthRule, made: ExitStack
+    ) -> None:
         gl = context.gl
         self._rule = rule
         # moderngl wants all attachments to be made with one number of samples, and knows no 32-bit float depth
         made_with = 0 if samples == 1 else samples
         self.color = gl.texture(size, 4, dtype="f4", samples=made_with)
+        made.callback(self.color.release)
         self._depth = gl.depth_renderbuffer(size, samples=made_with)
+        made.callback(self._depth.release)
         context.store(self._depth, size, samples, DEPTH32F)
         self.framebuffer = gl.framebuffer([self.color], self._depth)
+        made.callback(self.framebuffer.release)
 
     def begin(self, background: tuple[float, float, float]) -> None:
         self.framebuffer.use()
@@ -138,9 +167,9 @@ class _Stage(Protocol):
 class _Resolve:
     """The hardware's own average of the samples of each pixel."""
 
-    def __init__(self, context: GraphicsContext, source: _Image, size: tuple[int, int]) -> None:
+    def __init__(self, context: GraphicsContext, source: _Image, size: tuple[int, int], made: ExitStack) -> None:
         self._context, self._source = context, source
-        self.output = _Image(context, size)
+        self.output = _Image(context, size, made)
 
     def run(self, _jitter: tuple[float, float], /) -> None:
         self._context.resolve(self._source.framebuffer, self.output.framebuffer)
@@ -153,15 +182,22 @@ class _ScreenStage:
     """A fragment shader over every pixel of the output, reading the source."""
 
     def __init__(
-        self, context: GraphicsContext, source: _Image, size: tuple[int, int], shader: str, **constants: int
+        self,
+        context: GraphicsContext,
+        source: _Image,
+        size: tuple[int, int],
+        made: ExitStack,
+        shader: str,
+        **constants: int,
     ) -> None:
         self._source = source
-        self.output = _Image(context, size)
+        self.output = _Image(context, size, made)
         lines = ["#version 330 core", *(f"#define {name} {value}" for name, value in constants.items()), "#line 1\n"]
         self._program = context.program(
             *("\n".join(lines) + read_shader(name) for name in ("screen.vert.glsl", shader))
         )
         self._screen = context.gl.vertex_array(self._program, [])
+        made.callback(self._screen.release)
 
     def run(self, _jitter: tuple[float, float], /) -> None:
         self.output.framebuffer.use()
@@ -179,9 +215,15 @@ class _Gather(_ScreenStage):
     """The average of the hardware samples that lie in a pixel, whichever pixel they were drawn for."""
 
     def __init__(
-        self, context: GraphicsContext, source: _Image, size: tuple[int, int], samples: int, margin: int
+        self,
+        context: GraphicsContext,
+        source: _Image,
+        size: tuple[int, int],
+        samples: int,
+        margin: int,
+        made: ExitStack,
     ) -> None:
-        super().__init__(context, source, size, "gather.frag.glsl", SAMPLES=samples)
+        super().__init__(context, source, size, made, "gather.frag.glsl", SAMPLES=samples)
         self._positions, self._margin = context.sample_positions(samples), margin
 
     def run(self, jitter: tuple[float, float], /) -> None:
@@ -193,5 +235,7 @@ class _Gather(_ScreenStage):
 class _Reduce(_ScreenStage):
     """The average of k x k pixels."""
 
-    def __init__(self, context: GraphicsContext, source: _Image, size: tuple[int, int], ssaa: int) -> None:
-        super().__init__(context, source, size, "reduce.frag.glsl", SSAA=ssaa)
+    def __init__(
+        self, context: GraphicsContext, source: _Image, size: tuple[int, int], ssaa: int, made: ExitStack
+    ) -> None:
+        super().__init__(context, source, size, made, "reduce.frag.glsl", SSAA=ssaa)

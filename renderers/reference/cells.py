@@ -1,6 +1,5 @@
 """Small exact pieces of arithmetic for lines inside a cell: doubled precision, crossings and sorting."""
 
-import numpy as np
 from numba import njit
 
 from aliasbench.scenes.model import FloatArray
@@ -80,14 +79,16 @@ def cross_lines(line: FloatArray, n: int, size: float, events: FloatArray, count
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def sort_prefix(values: FloatArray, n: int) -> None:
-    """Sort the first n values in place."""
-    if n > 48:
-        values[:n] = np.sort(values[:n])
-        return
-    for i in range(1, n):
-        v = values[i]
-        j = i - 1
-        while j >= 0 and values[j] > v:
-            values[j + 1] = values[j]
-            j -= 1
-        values[j + 1] = v
+    """Sort the first n values in place (Shell's way: plain insertion for a few)."""
+    gap = 1
+    while gap * 4 < n:
+        gap = gap * 9 // 4 + 1
+    while gap > 0:
+        for i in range(gap, n):
+            v = values[i]
+            j = i - gap
+            while j >= 0 and values[j] > v:
+                values[j + gap] = values[j]
+                j -= gap
+            values[j + gap] = v
+        gap = gap * 4 // 9

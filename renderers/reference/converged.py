@@ -1,11 +1,16 @@
-"""References of textured scenes: the mean of independent replicates, and a bound of 99 % confidence for all pixels.
+"""References of textured scenes: exact where they can be, else a mean of replicates with a bound of 99 % confidence.
 
-Each of the S replicates is an unbiased picture from stratified lines; the bound of a value is Student's t times its
-standard error. "All pixels at once" is taken literally: the quantile is Bonferroni's for every channel of every pixel,
-1 - 0.01 / (2 m). Pooling variances over pixels would be smaller and wrong, pixels differ by orders of magnitude.
+At an instant the box filter is exact (`textured`). Other filters add an unbiased estimate of a small rest (`weighted`),
+an open shutter averages exact instants from strata of the shutter, two to a stratum as mirror images, so that what is
+linear in time cancels; replicates share the finest strata, which makes their spread too large rather than too small.
+What would take too many clips is integrated exactly along lines (`scanlines`) and sampled across them.
+
+The bound of a value is Student's t times its standard error. "All pixels at once" is taken literally: the quantile is
+Bonferroni's for every channel of every pixel, 1 - 0.01 / (2 m). Pooling variances over pixels would be smaller and
+wrong, pixels differ by orders of magnitude.
 """
 
-from dataclasses import dataclass
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,120 +18,156 @@ from scipy.special import stdtrit
 
 from aliasbench.renderers.reference.cache import Stored
 from aliasbench.renderers.reference.faces import Faces
+from aliasbench.renderers.reference.filtered import is_pixel_box
 from aliasbench.renderers.reference.flat import over_bands, palette, scene_extent
+from aliasbench.renderers.reference.pans import average_slide, is_even_motion
 from aliasbench.renderers.reference.paths import Paths
 from aliasbench.renderers.reference.pieces import join_pieces, pieces_at
-from aliasbench.renderers.reference.runs import BILINEAR, GRID, SINE, ZONE
 from aliasbench.renderers.reference.scanlines import scan_rows
-from aliasbench.renderers.sampling.hashing import combine, unit
-from aliasbench.scenes.errors import NotAvailableError
-from aliasbench.scenes.model import Checker, FloatArray, Grating, ImageTexture, Scene, Texture
+from aliasbench.renderers.reference.texture_tables import TextureTable, texture_table
+from aliasbench.renderers.reference.textured import draw_textured, instant_of
+from aliasbench.renderers.reference.weighted import Cells, build_cells, sample_rest
+from aliasbench.renderers.sampling.filters import FilterSpec
+from aliasbench.renderers.sampling.hashing import combine, permute, unit
+from aliasbench.scenes.model import FloatArray, ImageTexture, Scene
 from aliasbench.scenes.projection import view_at
 
 REPLICATES = 16
 _LINES = 64  # of a row in a replicate, at 256 x 256; the work is the same at other sizes
 _TIMES = 32
 _CONFIDENCE = 0.99
+_STRATA_WORK, _MOST_STRATA = 2**16, 32  # pixels of a replicate, of strata of the shutter
+_CELL_WORK, _MOST_CELLS = 2**24, 21  # cells under all filters of a replicate; to a pixel along one axis
+_FLOOR = 1e-9  # for the rounding of what is averaged
 
-
-@dataclass(frozen=True, slots=True, eq=False)
-class TextureTable:
-    """The textures of all objects as the kernels want them; see `scanlines.scan_rows`."""
-
-    kinds: NDArray[np.int64]
-    maps: FloatArray
-    params: FloatArray
-    sizes: NDArray[np.int64]
-    offsets: NDArray[np.int64]
-    texels: FloatArray
-
-
-def texture_table(scene: Scene, *, linear: bool) -> TextureTable:
-    """Return the textures of a scene's objects; `linear` images are blended, analytic textures always exact.
-
-    Raises
-    ------
-    NotAvailableError
-        For an image whose alpha cuts out parts.
-    """
-    n = len(scene.objects)
-    kinds, maps, params = np.full(n, -1, np.int64), np.zeros((n, 2, 3)), np.zeros((n, 8))
-    sizes, offsets = np.ones((n, 2), np.int64), np.zeros(n, np.int64)
-    blocks: list[FloatArray] = []
-    placed: dict[str, int] = {}
-    end = 0
-    for index, surface in enumerate(scene.objects):
-        if surface.texture is None:
-            continue
-        texture = scene.textures[surface.texture]
-        kinds[index], maps[index], params[index], block = _own_form(surface.texture, texture, linear)
-        sizes[index] = block.shape[:2]
-        if surface.texture not in placed:
-            placed[surface.texture] = end
-            blocks.append(np.asarray(block, dtype=np.float64).reshape(-1, 3))
-            end += block.shape[0] * block.shape[1]
-        offsets[index] = placed[surface.texture]
-    return TextureTable(kinds, maps, params, sizes, offsets, np.concatenate([*blocks, np.zeros((1, 3))]))
-
-
-def _own_form(name: str, texture: Texture, linear: bool) -> tuple[int, FloatArray, FloatArray, NDArray[np.floating]]:
-    """Return kind, map, params and texels of one texture."""
-    params = np.zeros(8)
-    if isinstance(texture, ImageTexture):
-        if texture.alpha_cutoff is not None and float(texture.texels[..., 3].min()) < texture.alpha_cutoff:
-            raise NotAvailableError(
-                f"reference: texture {name!r} cuts out parts by alpha_cutoff, which is not available yet; "
-                "available: images without holes"
-            )
-        h, w = texture.texels.shape[:2]
-        matrix = np.array([[w, 0.0, 0.0], [0.0, h, 0.0]])
-        return (BILINEAR if linear else GRID), matrix, params, np.ascontiguousarray(texture.texels[..., :3])
-    if isinstance(texture, Checker):
-        matrix = np.array([[texture.squares[0], 0.0, 0.0], [0.0, texture.squares[1], 0.0]])
-        black, white = texture.black, texture.white
-        return GRID, matrix, params, np.array([[black, white], [white, black]])
-    if isinstance(texture, Grating):
-        angle = np.radians(texture.angle_deg)
-        row = np.array([np.cos(angle), np.sin(angle), 0.0]) * texture.cycles
-        row[2] = texture.phase
-        if texture.profile == "square":
-            # half a cycle to a texel, the first of them centred on phase 0
-            row = 2 * row + np.array([0.0, 0.0, 0.5])
-            return GRID, np.stack([row, np.zeros(3)]), params, np.array([[texture.high, texture.low]])
-        params[:3], params[3:6] = texture.low, texture.high
-        return SINE, np.stack([row, np.zeros(3)]), params, np.zeros((1, 1, 3))
-    params[3:] = 1.0, 1.0, 1.0, texture.k, texture.phase
-    matrix = np.array([[1.0, 0.0, -texture.center[0]], [0.0, 1.0, -texture.center[1]]])
-    return ZONE, matrix, params, np.zeros((1, 1, 3))
+Maker = Callable[[int], FloatArray]
 
 
 def converge(
-    scene: Scene, faces: Faces, paths: Paths, size: tuple[int, int], frame: int, *, linear: bool, spread: bool
-) -> Stored:
-    """Return the reference of a textured scene with its 99 % bound.
+    scene: Scene, faces: Faces, paths: Paths, size: tuple[int, int], frame: int, spec: FilterSpec, *, linear: bool,
+    spread: bool,
+) -> Stored:  # fmt: skip
+    """Return the reference of a textured scene; of 0 samples where it is exact, with a certified bound.
 
     Parameters
     ----------
+    spec : FilterSpec
     linear : bool
         Whether images are blends of their texels instead of squares.
     spread : bool
         Whether to average over the open shutter, else at its middle.
     """
     table = texture_table(scene, linear=linear)
-    times = _TIMES if spread else 1
-    # an analytic texture has few squares or none: a line is cheap
-    dear = any(isinstance(t, ImageTexture) for t in scene.textures.values())
-    lines = int(np.clip(_LINES * (1 if dear else 4) * 65536 / (size[0] * size[1]), 8, 512))
+    shutter = scene.animation.shutter
+    cells = None if is_pixel_box(spec) else build_cells(spec, _cells_each(spec, size, spread=spread))
+
+    def snapshot(fraction: float) -> "_Snapshot":
+        return _Snapshot(scene, faces, paths, size, frame, fraction, table, cells)
+
+    if spread and cells is None:
+        slide = _slide(scene, faces, paths, size, frame, table)
+        if slide is not None:
+            return slide
+    middle = snapshot(shutter / 2)
+    if middle.bound is None and cells is None:
+        return _by_lines(scene, faces, paths, size, frame, table, spread=spread)
+    if not spread:
+        if cells is None and middle.bound is not None:
+            return Stored(middle.base, middle.bound, 0)
+        return _average(lambda replicate: middle.picture(replicate), size, 1, middle.bound or 0.0)
+    strata = int(np.clip(_STRATA_WORK // (size[0] * size[1]), 1, _MOST_STRATA))
+
+    def one(replicate: int) -> FloatArray:
+        total = np.zeros((size[1], size[0], 3))
+        for k in range(strata):
+            key = combine(combine(0x7E57, k), frame)
+            u = (permute(replicate, REPLICATES, key) + unit(combine(key, 1), replicate)) / (2 * REPLICATES)
+            for half, place in enumerate((u, 1.0 - u)):
+                seed = (replicate * strata + k) * 2 + half
+                total += snapshot(shutter * (k + place) / strata).picture(seed)
+        return total / (2 * strata)
+
+    return _average(one, size, 2 * strata, middle.bound or 0.0)
+
+
+def _slide(
+    scene: Scene, faces: Faces, paths: Paths, size: tuple[int, int], frame: int, table: TextureTable
+) -> Stored | None:
+    """Return the exact mean over the open shutter where textures only slide along their rows."""
+    if not is_even_motion(paths, frame):
+        return None
+    begin, end = (
+        instant_of(scene, faces, paths, view_at(scene.camera, scene.animation, frame, f, size), frame, f, table)
+        for f in (0.0, scene.animation.shutter)
+    )
+    slide = average_slide(begin, end)
+    exact = None if slide is None else draw_textured(slide)
+    return None if exact is None else Stored(exact.pixels, float(exact.bound.max()), 0)
+
+
+def _cells_each(spec: FilterSpec, size: tuple[int, int], *, spread: bool) -> int:
+    """Return how many cells to a pixel pay: the error falls with their number, the work is one term for each."""
+    work = _CELL_WORK / (16 if spread else 1) / (size[0] * size[1])
+    each = int(min(np.sqrt(work) / max(1.0, 2 * spec.support), _MOST_CELLS))
+    return max(3, each - 1 + each % 2)
+
+
+class _Snapshot:
+    """A scene at one instant: its exact box-filtered picture, or what is exact of it under another filter."""
+
+    def __init__(
+        self, scene: Scene, faces: Faces, paths: Paths, size: tuple[int, int], frame: int, fraction: float,
+        table: TextureTable, cells: Cells | None,
+    ) -> None:  # fmt: skip
+        view = view_at(scene.camera, scene.animation, frame, fraction, size)
+        fine = view if cells is None else cells.fine_view(view)
+        self.instant = instant_of(scene, faces, paths, fine, frame, fraction, table)
+        exact = draw_textured(self.instant)
+        self.bound = None if exact is None else float(exact.bound.max())
+        self.means = np.zeros((fine.height, fine.width, 3)) if exact is None else exact.pixels
+        self.cells, self.size, self.frame = cells, size, frame
+        self.base = self.means if cells is None else cells.gather(self.means, size)
+
+    def picture(self, seed: int) -> FloatArray:
+        """Return the exact picture, or an unbiased estimate of it."""
+        if self.cells is None:
+            return self.base
+        at = self.instant
+        return self.base + sample_rest(
+            self.cells, at.pieces, at.surfaces, at.colors, self.means, at.view.perspective, at.extent, self.size,
+            seed, self.frame,
+        )  # fmt: skip
+
+
+def _average(make: Maker, size: tuple[int, int], per_pixel: int, bound: float) -> Stored:
+    """Return the mean of the replicates and its 99 % bound, to which the certified bound of each is added."""
     mean, spread_sum = np.zeros((size[1], size[0], 3)), np.zeros((size[1], size[0], 3))
     for replicate in range(REPLICATES):
-        picture = _replicate(scene, faces, paths, size, frame, table, times, max(1, lines // times), replicate)
+        picture = make(replicate)
         change = picture - mean
         mean += change / (replicate + 1)
         spread_sum += change * (picture - mean)
     error = np.sqrt(spread_sum / (REPLICATES - 1) / REPLICATES)
     quantile = -float(stdtrit(REPLICATES - 1, (1 - _CONFIDENCE) / (2 * mean.size)))
+    samples = REPLICATES * per_pixel * size[0] * size[1]
+    return Stored(mean, quantile * float(error.max()) + bound + _FLOOR, samples)
+
+
+def _by_lines(
+    scene: Scene, faces: Faces, paths: Paths, size: tuple[int, int], frame: int, table: TextureTable, *, spread: bool
+) -> Stored:
+    """Return the mean of replicates from stratified lines."""
+    times = _TIMES if spread else 1
+    # an analytic texture has few squares or none: a line is cheap
+    dear = any(isinstance(t, ImageTexture) for t in scene.textures.values())
+    lines = int(np.clip(_LINES * (1 if dear else 4) * 65536 / (size[0] * size[1]), 8, 512))
     rows = lines // times * times if times > 1 else lines
-    return Stored(mean, quantile * float(error.max()) + 1e-9, REPLICATES * rows * size[0] * size[1])
+    return _average(
+        lambda replicate: _replicate(
+            scene, faces, paths, size, frame, table, times, max(1, lines // times), replicate
+        ),
+        size, rows, 0.0,
+    )  # fmt: skip
 
 
 def _replicate(

@@ -19,8 +19,8 @@ from aliasbench.scenes.model import FloatArray
 
 IntArray = NDArray[np.int64]
 
-_MANY_LINES = 32
-_MAX_LEVEL = 5
+MANY_LINES = 32
+MAX_LEVEL = 5
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -38,64 +38,89 @@ def cover_rows(
     total, comp = np.zeros(3), np.zeros(3)
     for t in range(len(weights)):
         first, last = instants[t], instants[t + 1]
-        low, high = np.empty(last - first), np.empty(last - first)
-        band = np.empty(last - first, np.int64)
-        here = 0
-        for i in range(first, last):
-            top, bottom = np.inf, -np.inf
-            for k in range(starts[i], starts[i + 1]):
-                top, bottom = min(top, points[k, 1]), max(bottom, points[k, 1])
-            if top < rows[1] and bottom > rows[0]:
-                band[here], low[here], high[here] = i, top, bottom
-                here += 1
+        band, low, high, here = band_candidates(points, starts, first, last, rows)
         for row in range(rows[0], rows[1]):
-            n = 0
-            for i in range(here):
-                if low[i] < row + 1 and high[i] > row:
-                    n += 1
-            ids = np.empty(n, np.int64)
-            left, right = np.empty(n), np.empty(n)
-            solid = np.empty((n, 2))
-            n = 0
-            for i in range(here):
-                if low[i] < row + 1 and high[i] > row:
-                    lo, hi = row_extent(points, starts[band[i]], starts[band[i] + 1], row, row + 1)
-                    if lo < width and hi > 0:
-                        ids[n], left[n], right[n] = band[i], lo, hi
-                        solid[n] = _solid_extent(points, starts[band[i]], starts[band[i] + 1], row)
-                        n += 1
-            order = np.argsort(left[:n])
-            active = np.empty(n, np.int64)
-            cand = np.empty(n, np.int64)
-            count, coming = 0, 0
+            first_of, ids, alone = row_candidates(points, starts, band, low, high, here, row, width)
             for column in range(width):
-                kept = 0
-                for a in range(count):
-                    if right[active[a]] > column:
-                        active[kept] = active[a]
-                        kept += 1
-                count = kept
-                while coming < n and left[order[coming]] < column + 1:
-                    if right[order[coming]] > column:
-                        active[count] = order[coming]
-                        count += 1
-                    coming += 1
-                if count == 0 or (count == 1 and solid[active[0], 0] <= column and column + 1 <= solid[active[0], 1]):
-                    shown = -1 if count == 0 else owners[ids[active[0]]]
+                begin, count = first_of[column], first_of[column + 1] - first_of[column]
+                if alone[column]:
+                    shown = -1 if count == 0 else owners[ids[begin]]
                     for c in range(3):
                         out[row, column, c] += weights[t] * colors[shown, c]
                     continue
-                for a in range(count):
-                    cand[a] = ids[active[a]]
                 total[:] = 0.0
                 comp[:] = 0.0
                 work += _pixel(
-                    points, starts, planes, owners, colors, perspective, extent, cand, count,
+                    points, starts, planes, owners, colors, perspective, extent, ids[begin:], count,
                     float(column), float(row), total, comp,
                 )  # fmt: skip
                 for c in range(3):
                     out[row, column, c] += weights[t] * (total[c] + comp[c])
     return work
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def band_candidates(
+    points: FloatArray, starts: IntArray, first: int, last: int, rows: IntArray
+) -> tuple[IntArray, FloatArray, FloatArray, int]:
+    """Return the pieces that reach into rows [rows[0], rows[1]), their least and greatest y, and their number."""
+    low, high = np.empty(last - first), np.empty(last - first)
+    band = np.empty(last - first, np.int64)
+    here = 0
+    for i in range(first, last):
+        top, bottom = np.inf, -np.inf
+        for k in range(starts[i], starts[i + 1]):
+            top, bottom = min(top, points[k, 1]), max(bottom, points[k, 1])
+        if top < rows[1] and bottom > rows[0]:
+            band[here], low[here], high[here] = i, top, bottom
+            here += 1
+    return band, low, high, here
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def row_candidates(
+    points: FloatArray, starts: IntArray, band: IntArray, low: FloatArray, high: FloatArray, here: int, row: int,
+    width: int,
+) -> tuple[IntArray, IntArray, NDArray[np.bool_]]:  # fmt: skip
+    """Return the pieces that may reach into each pixel of a row.
+
+    Returns
+    -------
+    first_of : (width + 2,) int64
+    ids : (k,) int64
+        The pieces of column x: ids[first_of[x] : first_of[x + 1]].
+    alone : (width,) bool
+        Whether one thing fills the pixel for certain: its only piece, or the background.
+    """
+    spans = np.empty((here, 2), np.int64)
+    solid = np.empty((here, 2))
+    # numbers in each column, moved up by two so that the sums below end as first places
+    first_of = np.zeros(width + 2, np.int64)
+    for i in range(here):
+        spans[i] = 0, 0
+        if low[i] < row + 1 and high[i] > row:
+            lo, hi = row_extent(points, starts[band[i]], starts[band[i] + 1], row, row + 1)
+            if lo < width and hi > 0:
+                spans[i] = int(max(0.0, np.floor(lo))), int(min(float(width), np.ceil(hi)))
+                solid[i] = _solid_extent(points, starts[band[i]], starts[band[i] + 1], row)
+                for column in range(spans[i, 0], spans[i, 1]):
+                    first_of[column + 2] += 1
+    for column in range(width):
+        first_of[column + 2] += first_of[column + 1]
+    ids = np.empty(first_of[width + 1], np.int64)
+    for i in range(here):
+        for column in range(spans[i, 0], spans[i, 1]):
+            ids[first_of[column + 1]] = i
+            first_of[column + 1] += 1
+    alone = np.empty(width, np.bool_)
+    for column in range(width):
+        begin, n = first_of[column], first_of[column + 1] - first_of[column]
+        alone[column] = n == 0
+        if n == 1:
+            alone[column] = solid[ids[begin], 0] <= column and column + 1 <= solid[ids[begin], 1]
+    for k in range(len(ids)):
+        ids[k] = band[ids[k]]
+    return first_of, ids, alone
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -145,7 +170,7 @@ def _pixel(
     extent: float, cand: IntArray, n: int, x: float, y: float, total: FloatArray, comp: FloatArray,
 ) -> int:  # fmt: skip
     """Sum the colours of one pixel, dividing it where too many edges meet; return the number of slabbed cells."""
-    stack = np.empty((3 * _MAX_LEVEL + 4, 4))
+    stack = np.empty((3 * MAX_LEVEL + 4, 4))
     stack[0] = x, y, 1.0, 0.0
     depth = 1
     work = 0
@@ -154,7 +179,7 @@ def _pixel(
         cx, cy, size, level = stack[depth]
         answer = _cell(
             points, starts, planes, owners, colors, perspective, extent, cand, n, cx, cy, size,
-            level < _MAX_LEVEL, total, comp,
+            level < MAX_LEVEL, total, comp,
         )  # fmt: skip
         if answer == 2:
             half = size / 2
@@ -173,7 +198,33 @@ def _cell(
 ) -> int:  # fmt: skip
     """Sum the colours of one cell; return 0 if one colour fills it, 1 if it took slabs, 2 if it must be divided."""
     kept = np.empty(n, np.int64)
-    edges = np.empty(n, np.int64)  # how many edges of the piece cross the cell; 0: it fills the cell
+    edges = np.empty(n, np.int64)
+    count = select_pieces(points, starts, planes, owners, perspective, extent, cand, n, X, Y, size, kept, edges)
+    lines = edges[:count].sum()
+    if count == 0:
+        add_area(total, comp, colors[-1], size * size)
+        return 0
+    if count == 1 and lines == 0:
+        add_area(total, comp, colors[owners[kept[0]]], size * size)
+        return 0
+    if divisible and lines > MANY_LINES:
+        return 2
+    cut_slabs(
+        points, starts, planes, owners, colors, perspective, extent,
+        kept, edges, count, lines, X, Y, size, total, comp,
+    )  # fmt: skip
+    return 1
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def select_pieces(
+    points: FloatArray, starts: IntArray, planes: FloatArray, owners: IntArray, perspective: bool, extent: float,
+    cand: IntArray, n: int, X: float, Y: float, size: float, kept: IntArray, edges: IntArray,
+) -> int:  # fmt: skip
+    """Return how many pieces may be seen in a cell, and fill which (`kept`) and how many of their edges cross it.
+
+    A piece with 0 `edges` fills the cell.
+    """
     count = 0
     mx, my, half = X + size / 2, Y + size / 2, size / 2
     for a in range(n):
@@ -192,21 +243,7 @@ def _cell(
         if not outside:
             kept[count], edges[count] = i, crossing
             count += 1
-    count = _drop_hidden(planes, owners, perspective, extent, kept, edges, count, X, Y, size)
-    lines = edges[:count].sum()
-    if count == 0:
-        add_area(total, comp, colors[-1], size * size)
-        return 0
-    if count == 1 and lines == 0:
-        add_area(total, comp, colors[owners[kept[0]]], size * size)
-        return 0
-    if divisible and lines > _MANY_LINES:
-        return 2
-    cut_slabs(
-        points, starts, planes, owners, colors, perspective, extent,
-        kept, edges, count, lines, X, Y, size, total, comp,
-    )  # fmt: skip
-    return 1
+    return _drop_hidden(planes, owners, perspective, extent, kept, edges, count, X, Y, size)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -25,7 +25,9 @@ BoolArray = NDArray[np.bool_]
 Triple = tuple[float, float, float]
 
 MARGIN_PX = 4.0  # scenes go on outside the picture; the shutter's bound needs room for what comes in during a slice
-_NEAR = 1e-9  # relative to the largest camera coordinate
+# The near plane's depth over the largest camera coordinate. Nothing divides by the depth of parallel rays, and what lies
+# in the camera's own plane is seen: rounding must not take it for behind.
+_NEAR_PERSPECTIVE, _NEAR_PARALLEL = 1e-15, -1e-14
 _PLANES = 5
 
 
@@ -105,7 +107,8 @@ def pieces_at(
         velocity = paths.velocities(world, faces.ranges, frame, fraction)
         slack = paths.velocity_change(faces.ranges, speed) * slice_length
         drift = np.stack([velocity @ view.right, -(velocity @ view.up), slack], axis=1) * view.scale
-    near = _NEAR * float(np.abs(camera).max(initial=1e-300))
+    share = _NEAR_PERSPECTIVE if view.perspective else _NEAR_PARALLEL
+    near = share * float(np.abs(camera).max(initial=1e-285))
     half = np.array([view.width / 2 + MARGIN_PX, view.height / 2 + MARGIN_PX]) / view.scale
     count = len(faces.owners)
     room = len(faces.corners) + _PLANES * count
@@ -162,11 +165,12 @@ def _cut(
         da = _inside(a, plane, half, near, perspective)
         db = _inside(b, plane, half, near, perspective)
         if da >= 0.0:
-            out[size] = a
+            for c in range(8):
+                out[size, c] = a[c]
             size += 1
         if (da >= 0.0) != (db >= 0.0):
             # from the same end whichever face asks
-            swap = (a[0], a[1], a[2]) > (b[0], b[1], b[2])
+            swap = _follows(a, b)
             t = db / (db - da) if swap else da / (da - db)
             for c in range(8):
                 start, end = (b[c], a[c]) if swap else (a[c], b[c])
@@ -175,6 +179,15 @@ def _cut(
             out[size, 4] = 0.0 if da >= 0.0 else a[4]
             size += 1
     return size
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _follows(a: FloatArray, b: FloatArray) -> bool:
+    """Return whether a comes after b in the order of x, then y, then z."""
+    for c in range(3):
+        if a[c] != b[c]:
+            return a[c] > b[c]
+    return False
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

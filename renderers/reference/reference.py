@@ -1,8 +1,8 @@
 """The reference renderer: the exact picture of a scene, or one that states how far off it may be.
 
 Three ways, chosen by the scene: flat colours at an instant are exact up to rounding; flat colours over an open shutter
-carry a certified bound; textured surfaces are integrated exactly along lines and sampled across them, with a bound of
-99 % confidence that holds for all pixels at once. The seed changes nothing.
+carry a certified bound; textures at an instant are exact too, and moving ones are sampled in time, with a bound of 99 %
+confidence that holds for all pixels at once. The seed changes nothing.
 """
 
 import time
@@ -15,14 +15,16 @@ import numpy as np
 from aliasbench.renderers.frame import Frame
 from aliasbench.renderers.reference.cache import Stored, fetch
 from aliasbench.renderers.reference.faces import Faces, build_faces
-from aliasbench.renderers.reference.flat import Integral, draw_instant, draw_shutter
+from aliasbench.renderers.reference.filtered import draw_filtered, is_pixel_box, wide_view
+from aliasbench.renderers.reference.flat import Integral, draw_shutter
 from aliasbench.renderers.reference.paths import Paths, scene_paths
+from aliasbench.renderers.sampling.filters import FilterSpec, filter_of
 from aliasbench.renderers.technique import Technique
 from aliasbench.scenes.errors import NotAvailableError
 from aliasbench.scenes.model import Scene, content_digest
 from aliasbench.scenes.projection import view_at
 
-ALGORITHM = 1  # changes with anything that changes a reference's pixels: stored ones are not used then
+ALGORITHM = 2  # changes with anything that changes a reference's pixels: stored ones are not used then
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,6 +33,7 @@ class PreparedReference:
 
     scene: Scene
     technique: Technique
+    spec: FilterSpec
     size: tuple[int, int]
     faces: Faces
     paths: Paths
@@ -43,13 +46,15 @@ class PreparedReference:
         textured = any(o.texture is not None for o in self.scene.objects)
         if textured:
             stored = fetch(self.key(shown), lambda: self._textured(shown))
-        elif self._shutter_open:
+        elif self.shutter_open:
             stored = fetch(
                 self.key(shown), lambda: _stored(draw_shutter(self.scene, self.faces, self.paths, self.size, shown))
             )
         else:
             stored = _stored(
-                draw_instant(self.scene, self.faces, self.paths, self.size, shown, self.scene.animation.shutter / 2)
+                draw_filtered(
+                    self.scene, self.faces, self.paths, self.size, shown, self.scene.animation.shutter / 2, self.spec
+                )
             )
         return Frame(
             pixels=stored.pixels,
@@ -57,7 +62,7 @@ class PreparedReference:
             setup_seconds=self.setup_seconds,
             samples=stored.samples,
             uncertainty=stored.uncertainty,
-            uncertainty_kind="confidence" if textured else "bound",
+            uncertainty_kind="confidence" if stored.samples else "bound",
         )
 
     def key(self, frame: int) -> str:
@@ -67,15 +72,15 @@ class PreparedReference:
         return content_digest((ALGORITHM, self.scene, self.size, fields, frame))
 
     @property
-    def _shutter_open(self) -> bool:
+    def shutter_open(self) -> bool:
         return self.scene.animation.shutter > 0.0 and self.technique.time == "spread" and not self.scene.is_static
 
     def _textured(self, frame: int) -> Stored:
         from aliasbench.renderers.reference.converged import converge
 
         return converge(
-            self.scene, self.faces, self.paths, self.size, frame, linear=self.technique.texture == "linear",
-            spread=self._shutter_open,
+            self.scene, self.faces, self.paths, self.size, frame, self.spec,
+            linear=self.technique.texture == "linear", spread=self.shutter_open,
         )  # fmt: skip
 
     def __enter__(self) -> Self:
@@ -108,15 +113,17 @@ def prepare_reference(scene: Scene, technique: Technique, size: tuple[int, int])
         For a feature that references do not have yet.
     """
     start = time.perf_counter()
-    if technique.filter != "box" or technique.radius_px != 0.5:
-        raise NotAvailableError(
-            f"reference: filter={technique.filter} of radius {technique.radius_px:g} is not available yet; "
-            "available: filter=box,radius=0.5"
-        )
+    spec = filter_of(technique)
     _refuse_missing(scene)
     paths = scene_paths(scene, interpolated=technique.motion == "matrix")
-    view_at(scene.camera, scene.animation, 0, 0.0, size)
-    return PreparedReference(scene, technique, size, build_faces(scene), paths, time.perf_counter() - start)
+    wide_view(view_at(scene.camera, scene.animation, 0, 0.0, size), spec)
+    prepared = PreparedReference(scene, technique, spec, size, build_faces(scene), paths, time.perf_counter() - start)
+    if not is_pixel_box(spec) and prepared.shutter_open and all(o.texture is None for o in scene.objects):
+        raise NotAvailableError(
+            f"reference: filter={technique.filter} of radius {technique.radius_px:g} is not available yet for "
+            "an open shutter; available: filter=box,radius=0.5"
+        )
+    return prepared
 
 
 def _refuse_missing(scene: Scene) -> None:

@@ -19,7 +19,7 @@ from aliasbench.scenes.model import FloatArray
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 
-_SQRT2 = 1.4142135623730951
+SQRT2 = 1.4142135623730951
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -60,23 +60,23 @@ def bound_edges(
             first = max(rows[0], int(np.floor(min(y0, y1) - near)))
             last = min(rows[1] - 1, int(np.floor(max(y0, y1) + near)))
             for row in range(first, last + 1):
-                ta, tb = _within(y0, y1, row - near, row + 1 + near)
+                ta, tb = within(y0, y1, row - near, row + 1 + near)
                 if ta > tb:
                     continue
                 xa, xb = x0 + ta * (x1 - x0), x0 + tb * (x1 - x0)
                 left = max(0, int(np.floor(max(min(xa, xb) - near, -1.0))))
                 right = min(width - 1, int(np.floor(min(max(xa, xb) + near, float(width)))))
                 for column in range(left, right + 1):
-                    sa, sb = _within(x0, x1, column - near, column + 1 + near)
+                    sa, sb = within(x0, x1, column - near, column + 1 + near)
                     sa, sb = max(sa, ta), min(sb, tb)
                     if sa > sb:
                         continue
                     speed = max(v0 + sa * (v1 - v0), v0 + sb * (v1 - v0))
-                    out[row, column] += step * min(1.0, _SQRT2 / 4 * speed * length)
+                    out[row, column] += step * min(1.0, SQRT2 / 4 * speed * length)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _within(a: float, b: float, low: float, high: float) -> tuple[float, float]:
+def within(a: float, b: float, low: float, high: float) -> tuple[float, float]:
     """Return the range of t in [0, 1] in which a + t (b - a) lies in [low, high], a little widened."""
     if abs(b - a) < 1e-9:
         return (0.0, 1.0) if a >= low - 1e-9 and a <= high + 1e-9 else (1.0, 0.0)
@@ -167,7 +167,7 @@ def _crossing(
     if low - rate_p - rate_q > 0.0 or high + rate_p + rate_q < 0.0:
         return 0.0
     # the line in which two planes of one body meet moves with the body
-    return min(1.0, _SQRT2 / 2 * max(near_p, near_q)) if alike else 1.0
+    return min(1.0, SQRT2 / 2 * max(near_p, near_q)) if alike else 1.0
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

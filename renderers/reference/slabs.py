@@ -36,21 +36,34 @@ def tie_of(perspective: bool, extent: float, a: float, b: float) -> float:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def cut_slabs(
-    points: FloatArray, starts: IntArray, planes: FloatArray, owners: IntArray, colors: FloatArray, perspective: bool,
-    extent: float, kept: IntArray, edges: IntArray, count: int, lines: int, X: float, Y: float, size: float,
-    total: FloatArray, comp: FloatArray,
-) -> None:  # fmt: skip
-    """Cut a cell into slabs and spans, and add the colour seen in each."""
+def gather_lines(
+    points: FloatArray, starts: IntArray, planes: FloatArray, perspective: bool, extent: float, kept: IntArray,
+    edges: IntArray, count: int, lines: int, X: float, Y: float, size: float,
+) -> tuple[FloatArray, IntArray, IntArray, FloatArray, FloatArray, int, int]:  # fmt: skip
+    """Return the lines that cross a cell and the sorted heights at which anything happens in it.
+
+    Returns
+    -------
+    line : (n, 4) float64
+        Intercept at the cell's top, slope dx/dy, first and last height; all relative to the cell's corner.
+    piece : (n,) int64
+        The index into `kept`, -1 where two planes meet.
+    side : (n,) int64
+        -1: the piece is to the right of the line; 1: to the left.
+    band : (count, 2) float64
+        First and last height of every piece.
+    events : (m,) float64
+    n, m : int
+        How much of these arrays is filled.
+    """
     room = lines
     for a in range(count):
         for b in range(a):
             if _planes_meet(planes[kept[a], 0], planes[kept[b], 0], perspective, extent, X, Y, size):
                 room += 1
-    # columns: intercept at the cell's top, slope dx/dy, first and last height; all relative to the cell's corner
     line = np.empty((room, 4))
-    piece = np.empty(room, np.int64)  # the index into `kept`, -1 where two planes meet
-    side = np.empty(room, np.int64)  # -1: the piece is to the right of the line; 1: to the left
+    piece = np.empty(room, np.int64)
+    side = np.empty(room, np.int64)
     band = np.empty((count, 2))
     events = np.empty(2 + 2 * count + 4 * room + room * (room - 1) // 2 + room)
     nl, ne = 0, 2
@@ -98,6 +111,19 @@ def cut_slabs(
                 nl += 1
     ne = cross_lines(line, nl, size, events, ne)
     sort_prefix(events, ne)
+    return line, piece, side, band, events, nl, ne
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def cut_slabs(
+    points: FloatArray, starts: IntArray, planes: FloatArray, owners: IntArray, colors: FloatArray, perspective: bool,
+    extent: float, kept: IntArray, edges: IntArray, count: int, lines: int, X: float, Y: float, size: float,
+    total: FloatArray, comp: FloatArray,
+) -> None:  # fmt: skip
+    """Cut a cell into slabs and spans, and add the colour seen in each."""
+    line, piece, side, band, events, nl, ne = gather_lines(
+        points, starts, planes, perspective, extent, kept, edges, count, lines, X, Y, size
+    )
     xs = np.empty(nl + 2)
     spans = np.empty((count, 2))
     previous = 0.0
@@ -129,7 +155,7 @@ def cut_slabs(
         begin, shown = 0.0, -2
         for s in range(1, nx):
             x = (xs[s - 1] + xs[s]) / 2
-            owner = _front(planes, owners, perspective, extent, kept, spans, count, X, Y, x, middle)
+            owner = front_owner(planes, owners, perspective, extent, kept, spans, count, X, Y, x, middle)
             # equal colours side by side are one trapezoid
             if s > 1 and owner != shown:
                 add_area(total, comp, colors[shown], height * (xs[s - 1] - begin))
@@ -152,7 +178,7 @@ def _planes_meet(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _front(
+def front_owner(
     planes: FloatArray, owners: IntArray, perspective: bool, extent: float, kept: IntArray, spans: FloatArray,
     count: int, X: float, Y: float, x: float, y: float,
 ) -> int:  # fmt: skip

@@ -9,6 +9,7 @@ from typing import Self
 import numpy as np
 import pytest
 
+from aliasbench.bench import cli
 from aliasbench.renderers import catalog
 from aliasbench.renderers.frame import Frame
 from aliasbench.renderers.technique import Technique
@@ -65,6 +66,18 @@ class FakePrepared:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.fakes.open_count -= 1
+
+
+@pytest.fixture
+def run(capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]]:
+    """The command line, called in this process: its exit code and what it wrote to either stream."""
+
+    def call(*arguments: str) -> tuple[int, str, str]:
+        code = cli.main(arguments)
+        captured = capsys.readouterr()
+        return code, captured.out, captured.err
+
+    return call
 
 
 @pytest.fixture

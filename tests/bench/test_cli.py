@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from aliasbench.bench import cli, doctor
+from aliasbench.bench import doctor
 from aliasbench.bench.arguments import COMMANDS, NOT_YET
 from aliasbench.bench.frames import read_image
 from aliasbench.bench.listing import SECTIONS
@@ -23,16 +23,6 @@ from aliasbench.scenes.model import Camera, Scene
 
 Run = Callable[..., tuple[int, str, str]]
 PROGRAM = [sys.executable, "-m", "aliasbench.bench"]
-
-
-@pytest.fixture
-def run(capsys: pytest.CaptureFixture[str]) -> Run:
-    def call(*arguments: str) -> tuple[int, str, str]:
-        code = cli.main(arguments)
-        captured = capsys.readouterr()
-        return code, captured.out, captured.err
-
-    return call
 
 
 def assert_refused(result: tuple[int, str, str], sentence: str) -> None:
@@ -54,7 +44,12 @@ def assert_refused(result: tuple[int, str, str], sentence: str) -> None:
         ("render propeller raytrace: -o OUT.exr --size 0x5", "'0x5': width must be from 1 to 65536"),
         ("render propeller raytrace: -o OUT.exr --size 5x0", "'5x0': height must be from 1 to 65536"),
         ("render propeller raytrace: -o OUT.exr --size 5", "'5' must be WIDTHxHEIGHT"),
-        ("render propeller raytrace: -o OUT.exr --size -3x5", "--size"),
+        ("render propeller raytrace: -o OUT.exr --size -3x5", "--size: '-3x5' must be WIDTHxHEIGHT, as in 512x512"),
+        ("render propeller raytrace: -o OUT.exr --size", "--size needs a value, --size WxH (see"),
+        ("run quick -o", "--output needs a value, --output RUN_DIR (see"),
+        ("-x", "unknown option of aliasbench '-x'; known: --help, --version"),
+        ("--verson", "unknown option of aliasbench '--verson'; did you mean '--version'?"),
+        ("run -o OUT --resume", "cannot resume 'out': no such folder; name a suite"),
         ("render propeller raytrace: -o OUT.exr --frame -1", "'-1' must be a whole number from 0"),
         ("render propeller raytrace: -o OUT.exr --seed 1.5", "'1.5' must be a whole number from 0"),
         ("render propeller raytrace: -o OUT.jpg", "unknown extension"),
@@ -183,6 +178,7 @@ class TestRun:
         assert exported["records"][0]["metrics"]["rmse"]["status"] == "ok"
         assert run("export", str(tmp_path / "run"), "-o", str(tmp_path / "a.json"))[0] == 0
         assert json.loads((tmp_path / "a.json").read_text()) == exported
+        assert run("export", str(tmp_path / "run"), "--json") == (0, text, "")
 
     def test_failed_cases_are_exit_code_1_with_the_reason_in_the_table(self, run: Run, tmp_path: Path, fakes) -> None:
         fakes.fail = lambda _, technique, __: RuntimeError("lamp") if technique == "raster:" else None

@@ -45,6 +45,7 @@ machine.project_version = lambda: "0.0"
 sys.exit(cli.main(sys.argv[2:]))
 """
 SUITE = """
+schema = 1
 size = [16, 16]
 frames = 2
 rounds = 6

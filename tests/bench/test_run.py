@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from aliasbench.bench.export import load_run
-from aliasbench.bench.frames import read_image
+from aliasbench.bench.frames import read_image, write_image
 from aliasbench.bench.run import Step, start_run
 from aliasbench.bench.suite import Request, plan_run
 from aliasbench.metrics import catalog as metrics
@@ -18,6 +18,7 @@ from aliasbench.scenes import files
 from aliasbench.scenes.errors import InputError, UnsupportedScene
 
 SUITE = """
+schema = 1
 name = "fake"
 size = [8, 8]
 frames = 2
@@ -185,6 +186,21 @@ def test_progress_counts_every_render_up_to_the_total(fakes, request_all: Reques
     assert steps[-1].done == steps[-1].total == len(fakes.log)
     assert [s.done for s in steps] == sorted(s.done for s in steps)
     assert {s.doing for s in steps} >= {"one: reference:", "two: raster:", "two: speed"}
+    assert steps[-1].doing == "done"
+
+
+def test_progress_ends_at_the_total_whatever_fails(fakes, request_all: Request, tmp_path: Path) -> None:
+    steps: list[Step] = []
+    fakes.fail = lambda scene, technique, count: (
+        RuntimeError("x") if technique == "raster:" or (scene, count) == ("two", 4) else None
+    )
+    start_run(request_all, tmp_path / "run", on_step=steps.append)
+    assert {r["status"] for r in load_run(tmp_path / "run")["records"]} == {"ok", "failed"}
+    assert steps[-1] == Step("done", steps[-1].total, steps[-1].total)
+    assert [s.done for s in steps] == sorted(s.done for s in steps)
+    steps.clear()
+    start_run(Request(), tmp_path / "run", resume=True, on_step=steps.append)
+    assert steps == [Step("nothing left to do", 0, 0)]
 
 
 class TestResume:
@@ -226,6 +242,37 @@ class TestResume:
             again = next(r for r in parts["records"] if (r["scene"], r["technique"]) == key)
             assert again == record
 
+    @pytest.mark.parametrize("folder", ["frames", "references"])
+    @pytest.mark.parametrize("left", [None, 0.0, 0.3, 0.99])
+    def test_cases_whose_pictures_are_lost_or_damaged_are_done_again(
+        self, fakes, request_all: Request, tmp_path: Path, folder: str, left: float | None
+    ) -> None:
+        start_run(request_all, tmp_path / "run")
+        before = load_run(tmp_path / "run")
+        kind = folder.removesuffix("s")
+        lost = before["records"][1]["images"][kind]
+        hit = [r for r in before["records"] if r["images"][kind] == lost]
+        whole = (tmp_path / "run" / lost).read_bytes()
+        (tmp_path / "run" / lost).unlink()
+        if left is not None:
+            (tmp_path / "run" / lost).write_bytes(whole[: int(len(whole) * left)])
+        fakes.log.clear()
+        steps: list[Step] = []
+        start_run(Request(), tmp_path / "run", resume=True, on_step=steps.append)
+        assert (tmp_path / "run" / lost).read_bytes() == whole
+        assert load_run(tmp_path / "run") == before
+        assert {e[:2] for e in fakes.log if e[1] != "reference:"} == {(r["scene"], r["technique"]) for r in hit}
+        assert steps[0].doing.startswith(f"{len(hit)} case{'s' if len(hit) > 1 else ''} done again")
+        assert steps[-1] == Step("done", len(fakes.log), len(fakes.log))
+
+    def test_a_picture_of_another_size_is_no_picture_of_the_case(self, request_all: Request, tmp_path: Path) -> None:
+        start_run(request_all, tmp_path / "run")
+        picture = tmp_path / "run" / load_run(tmp_path / "run")["records"][0]["images"]["frame"]
+        whole = picture.read_bytes()
+        write_image(picture, np.zeros((4, 4, 3), np.float32))
+        start_run(Request(), tmp_path / "run", resume=True)
+        assert picture.read_bytes() == whole
+
     def test_a_run_is_not_written_over_unless_asked(self, request_all: Request, tmp_path: Path) -> None:
         start_run(request_all, tmp_path / "run")
         with pytest.raises(InputError, match="holds a run already: go on with --resume, or replace it with --fresh"):
@@ -256,13 +303,19 @@ class TestResume:
         (tmp_path / "begun").mkdir()
         (tmp_path / "begun" / "run.lock").touch()
         (tmp_path / "begun" / ".run.sqlite").write_text("half")
-        for name in ("begun", "none"):
+        (tmp_path / "empty").mkdir()
+        for name in ("begun", "empty"):
             start_run(request_all, tmp_path / name, resume=True)
             assert len(load_run(tmp_path / name)["records"]) == 8
         (tmp_path / "other").mkdir()
         (tmp_path / "other" / "thesis.txt").touch()
-        with pytest.raises(InputError, match="is no run directory"):
-            start_run(request_all, tmp_path / "other", resume=True)
+        for choice in ({}, {"resume": True}, {"fresh": True}):
+            with pytest.raises(InputError, match=r"is no run directory: .* other files; give a new or an empty folder"):
+                start_run(request_all, tmp_path / "other", **choice)
+        assert [path.name for path in (tmp_path / "other").iterdir()] == ["thesis.txt"]
+        with pytest.raises(InputError, match=r"cannot resume '.*none': no such folder; name a suite"):
+            start_run(Request(), tmp_path / "none", resume=True)
+        assert not (tmp_path / "none").exists()
 
 
 def test_a_case_of_a_run_is_the_same_in_every_shard(request_all: Request, tmp_path: Path) -> None:

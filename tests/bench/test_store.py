@@ -1,5 +1,6 @@
 """The run directory."""
 
+import resource
 import sqlite3
 from pathlib import Path
 
@@ -96,6 +97,29 @@ def test_newer_foreign_and_damaged_databases_are_refused(tmp_path: Path) -> None
     path.write_bytes(b"not a database at all" * 100)
     with pytest.raises(InputError, match="cannot be read"):
         store.read_cases(tmp_path)
+
+
+def test_a_full_disk_is_an_error_that_names_the_run(tmp_path: Path) -> None:
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    with RunStore.create(tmp_path / "run", {}, SPECS) as run:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (1, hard))
+        try:
+            with pytest.raises(InputError, match=r"^cannot write '.*run': "):
+                run.add_outcome("a", {"status": "ok"})
+            with pytest.raises(InputError, match=r"^cannot write '.*new': "):
+                RunStore.create(tmp_path / "new", {}, SPECS)
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+        run.add_outcome("b", {"status": "ok"})
+    assert [c.outcome is not None for c in store.read_cases(tmp_path / "run")] == [True, False]
+
+
+def test_what_is_forgotten_is_to_be_done_again_but_keeps_its_timings(tmp_path: Path) -> None:
+    with RunStore.create(tmp_path, {}, SPECS) as run:
+        run.add_outcome("a", {"status": "ok"})
+        run.add_round(0, {"a": 0.5})
+        run.forget_outcomes(["a"])
+        assert [(c.outcome, c.seconds, c.is_finished) for c in run.cases()][1] == (None, (0.5,), False)
 
 
 def test_folders_that_cannot_be_made_are_refused(tmp_path: Path) -> None:

@@ -91,7 +91,7 @@ class TestPlan:
     def test_cases_of_one_scene_and_size_follow_each_other(self, tmp_path: Path) -> None:
         path = tmp_path / "s.toml"
         path.write_text(
-            'scenes = ["a", "b"]\ntechniques = ["raster:"]\nframes = 1\n'
+            'schema = 1\nscenes = ["a", "b"]\ntechniques = ["raster:"]\nframes = 1\n'
             '[[case]]\nscenes = ["a"]\ntechniques = ["raytrace:"]\n[[case]]\nscenes = ["a"]\nsize = [9, 9]\n'
         )
         found = [(c.scene.name, c.size, c.technique.text) for c in plan_run(Request(str(path))).cases]
@@ -104,13 +104,34 @@ class TestPlan:
 
     def test_the_same_case_twice_is_an_error(self, tmp_path: Path) -> None:
         path = tmp_path / "s.toml"
-        path.write_text('scenes = ["a"]\ntechniques = ["raster:", "raster-1"]\n')
+        path.write_text('schema = 1\nscenes = ["a"]\ntechniques = ["raster:", "raster-1"]\n')
         with pytest.raises(InputError, match="a by raster: is there twice"):
             plan_run(Request(str(path)))
 
+    @pytest.mark.parametrize(
+        ("one", "other"),
+        [
+            ("raytrace:", "raytrace:spp=1"),
+            ("raster:", "raster:texture=nearest"),
+            ("raytrace:spp=4,filter=tent", "raytrace:filter=pyramid,spp=4,sampler=jittered"),
+        ],
+    )
+    def test_the_same_technique_spelled_differently_is_the_same_case(
+        self, tmp_path: Path, one: str, other: str
+    ) -> None:
+        path = tmp_path / "s.toml"
+        path.write_text(f'schema = 1\nscenes = ["a"]\ntechniques = ["{one}", "{other}"]\n')
+        with pytest.raises(InputError, match=f"a by {one} is there twice: {other} is the same technique"):
+            plan_run(Request(str(path)))
+        with pytest.raises(InputError, match="is there twice"):
+            plan_run(Request(scenes=("a",), techniques=(one, other)))
+        path.write_text(f'schema = 1\nscenes = ["a"]\ntechniques = ["{one}", "raster:msaa=4"]\n')
+        chosen = plan_run(Request(str(path), techniques=(other,))).cases
+        assert [case.technique.text for case in chosen] == [one]
+
     def test_a_bad_technique_names_the_suite(self, tmp_path: Path) -> None:
         path = tmp_path / "s.toml"
-        path.write_text('scenes = ["a"]\ntechniques = ["raster:mssa=4"]\n')
+        path.write_text('schema = 1\nscenes = ["a"]\ntechniques = ["raster:mssa=4"]\n')
         with pytest.raises(InputError, match=r"s\.toml: .*mssa.*msaa"):
             plan_run(Request(str(path)))
 
@@ -118,7 +139,12 @@ class TestPlan:
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
-        ("scenes = [1 2]", r"S: not valid TOML: .*line 1, column"),
+        ("scenes = [1 2]", r"S: not valid TOML: .*line 2, column"),
+        (f"rounds = {'9' * 5000}", r"S: not valid TOML: a number has too many digits$"),
+        (f"rounds = 0x{'f' * 9000}", r"S: rounds = a number too long to be shown: must be a whole number"),
+        (f"scenes = {'[' * 100_000}", r"S: not valid TOML: its values are nested too deeply$"),
+        (f"size{'.a' * 20_000} = 1", r"S: size = a value nested too deeply to be shown: must be \[width, height\]"),
+        (f"name = [{'1, ' * 1000}]", r"S: name = .{29}….{30}: must be text$"),
         ("schema = 2", r"S: schema = 2 is newer than this version, which reads up to 1"),
         ("schema = 'x'", r"S: schema = 'x': must be 1"),
         ("sizes = [1, 1]", r"S: unknown key 'sizes'; did you mean 'size'\?"),
@@ -143,16 +169,29 @@ class TestPlan:
 )
 def test_a_wrong_suite_says_where_what_and_what_is_allowed(text: str, sentence: str) -> None:
     with pytest.raises(InputError, match=sentence):
+        parse_suite(text if text.startswith("schema") else f"schema = 1\n{text}", "S", None, "s")
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("# nothing\n", r"S: is empty; a suite needs schema = 1, scenes = \[...\] and techniques = \[...\]$"),
+        ("scenes = ['a']", r"S: schema is missing; give schema = 1 at the top$"),
+    ],
+)
+def test_a_suite_says_what_is_missing(text: str, sentence: str) -> None:
+    with pytest.raises(InputError, match=sentence):
         parse_suite(text, "S", None, "s")
 
 
 def test_a_metric_that_is_planned_is_not_available() -> None:
     with pytest.raises((InputError, NotAvailableError), match=r"S: metrics = \['flip'\]: .*not available"):
-        parse_suite("metrics = ['flip']", "S", None, "s")
+        parse_suite("schema = 1\nmetrics = ['flip']", "S", None, "s")
 
 
 def test_groups_take_from_above_what_they_leave_out() -> None:
-    suite = parse_suite("rounds = 3\nsize = [2, 1]\n[[case]]\nscenes = ['a']\ntechniques = ['b']", "S", None, "s")
+    text = "schema = 1\nrounds = 3\nsize = [2, 1]\n[[case]]\nscenes = ['a']\ntechniques = ['b']"
+    suite = parse_suite(text, "S", None, "s")
     assert suite.groups == (Group(("a",), ("b",), (2, 1), "loop", (0,), 3),)
     assert suite.name == "s"
 
@@ -171,9 +210,19 @@ def test_a_suite_that_is_not_there_is_refused(text: str, sentence: str) -> None:
 
 
 def test_a_suite_that_is_no_text_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "s.toml").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(InputError, match="cannot be read"):
+    (tmp_path / "s.toml").write_bytes(b"# \xff\xfe\x00")
+    with pytest.raises(InputError, match=r"s\.toml': byte 2 is not UTF-8; a suite file is a TOML text in UTF-8$"):
         read_suite(str(tmp_path / "s.toml"))
+
+
+def test_a_byte_order_mark_is_no_part_of_a_suite(tmp_path: Path) -> None:
+    (tmp_path / "s.toml").write_bytes(b"\xef\xbb\xbf" + SMALL.encode())
+    assert read_suite(str(tmp_path / "s.toml")).name == "small"
+
+
+def test_a_name_that_no_file_can_have_is_refused() -> None:
+    with pytest.raises(InputError, match=r"suite 'x{28}….*: cannot be read \(File name too long\)$"):
+        read_suite("x" * 5000 + ".toml")
 
 
 @pytest.mark.parametrize("name", SUITES)

@@ -7,7 +7,7 @@ import pytest
 from rich.console import Console
 
 from aliasbench.bench.export import Record, Run
-from aliasbench.bench.table import failure_lines, record_tables
+from aliasbench.bench.table import failure_lines, legend_lines, record_tables
 
 
 def record(scene: str, technique: str, **changes: object) -> Record:
@@ -80,3 +80,33 @@ def test_in_a_narrow_terminal_no_word_is_cut_and_a_doubtful_time_is_marked(run: 
     text = printed({**run, "records": [noisy]}, 80)
     assert "~30" in text
     assert max(map(len, text.splitlines())) <= 80
+
+
+def test_the_marks_of_the_tables_are_explained_where_they_occur(run: Run) -> None:
+    hidden = {"rmse": {"value": None, "status": "below_reference_floor", "extras": {"floor": 0.0295}}}
+    noisy, floored = record("a", "x", seconds=[0.01, 0.02, 0.03, 0.04, 0.05]), record("a", "y", metrics=hidden)
+
+    def legend(*records: Record, width: int = 80) -> list[str]:
+        return legend_lines({**run, "records": list(records)}, width)
+
+    assert legend(record("a", "x")) == []
+    assert legend(noisy) == ["~: doubtful time, see the report"]
+    assert legend(noisy, width=140) == []
+    both = legend(noisy, floored)
+    assert both == ["~: doubtful time, see the report; < x: below what the reference can tell"]
+    assert legend(floored, width=140) == ["< x: below what the reference can tell"]
+
+
+@pytest.mark.parametrize(
+    ("hidden_count", "uncertainty", "said"), [(3, 0.0098, True), (2, 0.0098, False), (3, 1e-12, 0)]
+)
+def test_a_reference_that_hides_most_scores_is_named_with_its_uncertainty(
+    run: Run, hidden_count: int, uncertainty: float, said: bool
+) -> None:
+    hidden = {"value": None, "status": "below_reference_floor", "extras": {"floor": 0.03}}
+    known = {"value": 0.5, "status": "ok", "extras": {}}
+    metrics = {str(i): hidden if i < hidden_count else known for i in range(5)}
+    lines = legend_lines({**run, "records": [record("a", "x", metrics=metrics, uncertainty=uncertainty)]}, 140)
+    sentence = "a 8 x 8: its reference is uncertain by 0.0098, which hides 3 of 5 scores"
+    assert (sentence in lines) == bool(said)
+    assert len(lines) == 1 + bool(said)

@@ -81,6 +81,15 @@ def test_every_case_is_on_the_page_with_its_reason(typical: Path, tmp_path: Path
         assert page.words.count(technique) >= 4
 
 
+def test_links_to_scenes_say_the_size_where_it_tells_them_apart(
+    fabricate: Fabricate, make_record: MakeRecord, tmp_path: Path
+) -> None:
+    runs = [fabricate([make_record("a", "raster:", size=[side, side])], f"r{side}") for side in (32, 64)]
+    text = write_report([*runs, fabricate([make_record("b", "raster:")], "rb")], tmp_path).read_text(encoding="utf-8")
+    links = re.findall(r'<a href="#scene-\d+">([^<]*)</a>', text)
+    assert links == ["a 32 × 32", "a 64 × 64", "b"]
+
+
 def test_points_that_a_logarithmic_axis_cannot_show_are_named(typical: Path, tmp_path: Path) -> None:
     page = report([typical], tmp_path)
     assert re.search(r"no error that could be measured.*1 sample \(equal to the reference, 10\.1 ms\)", page.text)

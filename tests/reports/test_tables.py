@@ -109,6 +109,22 @@ def test_the_overview_has_each_technique_once_and_darkens_with_the_error(
     assert first.note == "10.1 ms"
 
 
+def test_the_overview_has_a_column_for_each_scene_size_and_run(
+    fabricate: Fabricate, make_record: MakeRecord, make_score: MakeRecord
+) -> None:
+    def rows(*sizes: int) -> list[dict[str, object]]:
+        made = [make_record("a", "raster:", size=[s, s], metrics={"rmse": make_score(1 / s)}) for s in sizes]
+        return [*made, make_record("b", "raster:", metrics={"rmse": make_score(0.5)})]
+
+    runs = load_runs([fabricate(rows(32, 64), "one"), fabricate(rows(64), "two")])
+    one = tables.overview_table(runs[0].records)
+    assert [(h.text, h.unit) for h in one.headings[1:]] == [("a", "32 × 32"), ("a", "64 × 64"), ("b", "")]
+    assert [c.sort for c in one.rows[0][1:]] == [repr(1 / 32), repr(1 / 64), "0.5"]
+    both = tables.overview_table([record for run in runs for record in run.records])
+    labels = [f"{h.text} {h.unit}" for h in both.headings[1:]]
+    assert labels == ["a 32 × 32, one", "a 64 × 64, one", "b one", "a 64 × 64, two", "b two"]
+
+
 def test_counts_name_every_status(typical: Path) -> None:
     (run,) = load_runs([typical])
     assert tables.status_counts(run.records) == {"ok": 4, "failed": 1, "unsupported": 1}

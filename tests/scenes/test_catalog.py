@@ -61,7 +61,16 @@ def test_parameters_take_both_ends_of_their_range_and_the_name_says_so(name: str
 def test_parameters_refuse_what_is_out_of_range_or_no_number(name: str, key: str) -> None:
     entry = SCENES[name]
     parameter = entry.parameters[key]
-    beyond: tuple[Any, ...] = (parameter.high + 1, parameter.low - 1, float("nan"), float("inf"), True, "3", None)
+    beyond: tuple[Any, ...] = (
+        parameter.high + 1,
+        parameter.low - 1,
+        float("nan"),
+        float("inf"),
+        True,
+        "3",
+        None,
+        10**5000,
+    )
     for value in (*beyond, *((parameter.default + 0.5,) if parameter.kind == "int" else ())):
         with pytest.raises(InputError) as caught:
             entry.build(**{key: value})
@@ -104,6 +113,19 @@ def test_wrong_texts_are_refused(text: str, message: str) -> None:
     with pytest.raises(InputError) as caught:
         build_scene(text)
     assert message in str(caught.value)
+
+
+def test_a_scene_of_the_catalog_is_named_by_a_text() -> None:
+    name: Any = 3
+    with pytest.raises(TypeError, match="named by a text, not by int"):
+        build_scene(name)
+
+
+def test_long_values_are_shortened_in_refusals() -> None:
+    for text in ("propeller:blades=" + "x" * 5000, "propeller:" + "x" * 5000, "propeller:" + "x" * 5000 + "=1"):
+        with pytest.raises(InputError, match=r"xxx\.\.\.") as caught:
+            build_scene(text)
+        assert len(str(caught.value)) < 300
 
 
 def test_a_name_carries_only_what_is_not_default_in_one_form() -> None:

@@ -4,6 +4,7 @@ import os
 import re
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import OpenImageIO as oiio
@@ -75,6 +76,8 @@ abbe = 30
 matrices = [[1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1], [1, 0, 0, 2, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]]
 [[object]]
 polygon = [[0, 0, 1], [1, 0, 1], [1, 1, 1]]
+uv = [[0, 0], [1, 0], [1, 1]]
+texture = "photo"
 material = "diffuse"
 [texture.tiles]
 checker = { squares = [16, 8], black = [0.1, 0, 0], white = [1, 1, 0.9] }
@@ -163,7 +166,12 @@ def test_every_key_of_the_schema_is_read(scene_file: Write) -> None:
                 material=Material("glass", ior=1.6, abbe=30.0),
                 motion=Motion(matrices=(IDENTITY, SHIFTED)),
             ),
-            polygon([(0, 0, 1), (1, 0, 1), (1, 1, 1)], material=Material("diffuse")),
+            polygon(
+                [(0, 0, 1), (1, 0, 1), (1, 1, 1)],
+                uv=[(0, 0), (1, 0), (1, 1)],
+                texture="photo",
+                material=Material("diffuse"),
+            ),
         ),
         textures={
             "tiles": Checker((16.0, 8.0), (0.1, 0.0, 0.0), (1.0, 1.0, 0.9)),
@@ -225,6 +233,28 @@ def test_a_file_that_is_no_text_is_refused(tmp_path: Path) -> None:
         load_scene(str(path))
 
 
+def test_a_byte_order_mark_is_passed_over(scene_file: Write) -> None:
+    assert load_scene(scene_file("\ufeff" + FLAT)) == load_scene(scene_file(FLAT))
+
+
+def test_a_small_scene_far_from_the_origin_is_accepted(scene_file: Write) -> None:
+    at, size = 1e6, 1e-6
+    corners = [[at, at, 0.0], [at + size, at, 0.0], [at, at + size, 0.0]]
+    scene = load_scene(
+        scene_file(
+            f"[camera]\nposition = [{at}, {at}, 5]\ntarget = [{at}, {at}, 0]\nheight = {size}\n"
+            f"[[object]]\npolygon = {corners}"
+        )
+    )
+    np.testing.assert_array_equal(scene.objects[0].vertices, corners)
+
+
+@pytest.mark.parametrize("given", [3, None, b"propeller", Path("propeller")])
+def test_a_scene_is_named_by_a_text(given: Any) -> None:
+    with pytest.raises(TypeError, match=f"is named by a text .*, not by {type(given).__name__}"):
+        load_scene(given)
+
+
 def test_arrays_without_end_are_refused_in_a_sentence(scene_file: Write) -> None:
     with pytest.raises(InputError, match=r"nested too deeply|not valid TOML"):
         load_scene(scene_file("a = " + "[" * 100_000))
@@ -273,7 +303,7 @@ def test_what_is_no_scene_is_refused_with_the_known_ones(text: str) -> None:
 
 
 def test_image_paths_are_relative_to_the_scene_file(scene_file: Write, monkeypatch: pytest.MonkeyPatch) -> None:
-    path = scene_file('[texture.a]\nimage = "pictures/one.png"')
+    path = scene_file(FLAT + 'texture = "a"\n[texture.a]\nimage = "pictures/one.png"')
     write_picture(Path(path).parent / "pictures" / "one.png")
     monkeypatch.chdir("/")
     texture = load_scene(path).textures["a"]

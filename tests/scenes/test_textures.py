@@ -1,5 +1,6 @@
 """Texture values follow the stated conventions, and filtering loses no light."""
 
+import os
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
@@ -81,6 +82,40 @@ def test_an_image_with_a_value_that_is_not_finite_is_refused(tmp_path: Path) -> 
     pixels[1, 0, 2] = np.nan
     with pytest.raises(InputError, match="has values that are not finite"):
         load_image(write(tmp_path / "a.exr", pixels))
+
+
+def test_values_that_no_picture_holds_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"has a value of 1e\+16; at most 1e\+15 is allowed"):
+        load_image(write(tmp_path / "a.exr", np.full((1, 1, 3), 1e16, np.float32)))
+
+
+@pytest.mark.parametrize("damage", ["corrupt", "cut off"])
+def test_a_damaged_image_is_refused_once_and_nothing_else_is_said(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], damage: str
+) -> None:
+    path = write(tmp_path / "a.png", np.random.default_rng(1).integers(0, 256, (64, 64, 3)).astype(np.uint8))
+    data = bytearray(path.read_bytes())
+    if damage == "corrupt":
+        data[len(data) // 2] ^= 255
+    else:
+        del data[len(data) // 2 :]
+    path.write_bytes(data)
+    with pytest.raises(InputError, match=r"cannot be read \([^()\n]+\)$") as caught:
+        load_image(path)
+    assert "PNG library error" not in str(caught.value)
+    os.write(2, b"heard again")
+    assert capfd.readouterr() == ("", "heard again")
+
+
+def test_what_is_no_regular_file_is_refused_as_such(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "fifo.png")
+    for path in (tmp_path, tmp_path / "fifo.png", Path("/dev/zero")):
+        with pytest.raises(InputError, match="not a regular file"):
+            load_image(path)
+    with pytest.raises(InputError, match="no such file"):
+        load_image(tmp_path / "gone.png")
+    with pytest.raises(InputError, match="File name too long"):
+        load_image(tmp_path / ("x" * 5000))
 
 
 @pytest.mark.parametrize("shift", [-3.0, 0.0, 5.0])

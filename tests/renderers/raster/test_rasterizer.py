@@ -3,11 +3,15 @@
 import gc
 from dataclasses import replace
 
+import moderngl
 import numpy as np
 import pytest
 
 from aliasbench.renderers.catalog import prepare, render
 from aliasbench.renderers.raster.context import acquire_context
+from aliasbench.renderers.raster.projection import DepthRule
+from aliasbench.renderers.raster.targets import Target
+from aliasbench.renderers.technique import parse_technique
 from aliasbench.scenes.errors import InputError, NotAvailableError
 from aliasbench.scenes.model import Light, Material
 
@@ -52,7 +56,7 @@ def test_frames_say_what_they_are(make):
 def test_a_closed_scene_refuses_to_draw(make):
     with prepare(make.star(), "raster", size=SIZE) as prepared:
         pass
-    with pytest.raises(RuntimeError, match="this prepared scene is closed"):
+    with pytest.raises(RuntimeError, match="this prepared scene is closed; prepare it again to render"):
         prepared.render()
 
 
@@ -129,3 +133,35 @@ def test_a_picture_of_one_pixel(make):
     whole = make.polygon([[-2, -2, 0], [2, -2, 0], [2, 2, 0], [-2, 2, 0]], color=(0.5, 0.25, 2.0))
     for technique in ("raster", "raster:msaa=4", "raster:msaa=4,passes=2", "raster:ssaa=5"):
         np.testing.assert_array_equal(render(make.scene(whole), technique, size=(1, 1)).pixels[0, 0], (0.5, 0.25, 2.0))
+
+
+@pytest.mark.parametrize("technique", ["raster", "raster:msaa=4,passes=2,ssaa=2", "raster:ssaa=3"])
+@pytest.mark.parametrize("lacking", [0, 1])
+def test_a_picture_that_finds_no_memory_is_refused_and_nothing_of_it_stays(make, monkeypatch, technique, lacking):
+    context = acquire_context()
+    real = context.gl
+    textures, framebuffers = [], []
+
+    def texture(*arguments, **options):
+        textures.append(real.texture(*arguments, **options))
+        return textures[-1]
+
+    def framebuffer(*arguments):
+        if len(framebuffers) == min(lacking, "=" in technique):
+            raise moderngl.Error("the framebuffer is not complete (INCOMPLETE_ATTACHMENT)")
+        framebuffers.append(real.framebuffer(*arguments))
+        return framebuffers[-1]
+
+    class Short:
+        """The context with no room for more framebuffers."""
+
+        def __getattr__(self, name):
+            return {"texture": texture, "framebuffer": framebuffer}.get(name) or getattr(real, name)
+
+    with context.use(), monkeypatch.context() as patch:
+        patch.setattr(context, "gl", Short())
+        with pytest.raises(InputError, match=r"size 32x24: this device .* cannot hold .*GiB.*; choose a smaller size"):
+            Target(context, SIZE, parse_technique(technique), DepthRule("<=", 1.0))
+    assert textures
+    assert all(isinstance(made.mglo, moderngl.mgl.InvalidObject) for made in (*textures, *framebuffers))
+    assert render(make.star(), technique, size=SIZE).pixels.max() > 0.5

@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from aliasbench.renderers.catalog import prepare, render
+from aliasbench.renderers.catalog import render
 from aliasbench.renderers.reference import reference
 from aliasbench.renderers.reference.cache import Stored, fetch
+from aliasbench.renderers.technique import parse_technique
 from aliasbench.scenes.model import Motion
 
 
@@ -67,8 +68,7 @@ def test_moving_reference_is_stored_and_returned_equal(moving, own_cache):
 
 def test_key_follows_everything_that_enters(moving, monkeypatch):
     def key(scene=moving, technique="reference:", size=(12, 12), frame=0):
-        with prepare(scene, technique, size=size) as prepared:
-            return prepared.key(frame)
+        return reference.prepare_reference(scene, parse_technique(technique), size).key(frame)
 
     base = key()
     assert key() == base

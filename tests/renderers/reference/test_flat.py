@@ -161,9 +161,6 @@ def test_seed_changes_nothing(make_polygon, make_scene):
 
 def test_missing_features_are_named(make_polygon, make_scene):
     triangle = make_polygon([(-0.5, -0.4), (0.7, 0.1), (0, 0.8)])
-    scene = make_scene([triangle])
-    with pytest.raises(NotAvailableError, match=r"filter=tent of radius 1 is not available yet; available: filter=box"):
-        render(scene, "reference:filter=tent", size=(4, 4))
     camera = Camera("perspective", fov_y_deg=30.0, lens_radius=0.1)
     with pytest.raises(InputError, match="lens_radius"):
         render(make_scene([triangle], camera=camera), "reference:", size=(4, 4))

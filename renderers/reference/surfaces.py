@@ -1,0 +1,190 @@
+"""How each textured piece is integrated: which direction its rows take in the picture, and how exact that is.
+
+Under perspective 1 / depth is constant along one direction of the picture (the horizon's). If a texture's v is so too,
+or u, whole rows are summed at once (`walks`); an orthographic piece always has such a direction. Else texels are
+clipped one by one (`tiles`). The bound of a piece follows from how far rounding may move the border of a texel: by d
+texels is off by at most d times the contrast, along u and along v.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aliasbench.renderers.reference.pieces import Pieces
+from aliasbench.renderers.reference.runs import BILINEAR, GRID, SINE
+from aliasbench.renderers.reference.texture_tables import TextureTable
+from aliasbench.scenes.model import FloatArray
+from aliasbench.scenes.projection import View
+
+FLAT, WALK, WALK_BLEND, WAVE, PLATE, CLIP, CLIP_BLEND = -1, 0, 1, 2, 3, 4, 5
+
+_EPS = 2.0**-52
+_FACING = 1e-11  # relative change of 1 / depth over a piece that is none
+_ALIGNED = 1e-9  # texels by which a row may leave its direction, across the picture
+_STEEPEST = 1e3  # how much faster u may change across the rows than along them
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Surfaces:
+    """What the kernels need of each piece.
+
+    Attributes
+    ----------
+    ways : (m,) int64
+        FLAT, WALK and so on.
+    own : (m, 3, 3) float64
+        Coefficients of u q, v q and q in the picture, u and v in the texture's own coordinates.
+    along : (m, 2) float64
+        The direction of the rows.
+    blocks : (m, 3) int64
+        Height, width and first row of the texels.
+    params : (m, 8) float64
+        As in `texture_tables`.
+    shifts : (m,) float64
+        By how many texels u moves while the shutter is open, 0 for none; see `pans`.
+    shifted : (m, 2, 3) int64
+        Then, the blocks of the rows' means, and of the running sums of what the texels differ from them.
+    texels, sums : (k, 3) float64
+        Rows of width + 1: texels with the first repeated, and their running sums (of neighbours' means, for blends).
+    bound : float
+        On the error of a pixel by rounding.
+    tiles : float
+        How many texels must be clipped one by one, about.
+    """
+
+    ways: NDArray[np.int64]
+    own: FloatArray
+    along: FloatArray
+    blocks: NDArray[np.int64]
+    params: FloatArray
+    shifts: FloatArray
+    shifted: NDArray[np.int64]
+    texels: FloatArray
+    sums: FloatArray
+    bound: float
+    tiles: float
+
+
+def build_surfaces(
+    pieces: Pieces, table: TextureTable, colors: FloatArray, uv_reach: FloatArray, view: View, far: float
+) -> Surfaces:
+    """Return how each piece is integrated.
+
+    Parameters
+    ----------
+    pieces : Pieces
+    table : TextureTable
+    colors : (objects + 1, 3)
+    uv_reach : (objects,)
+        The largest |u| or |v| of each object.
+    view : View
+    far : float
+        The largest distance of a vertex from the camera.
+    """
+    m = len(pieces.owners)
+    out = Surfaces(
+        np.full(m, FLAT, np.int64), np.zeros((m, 3, 3)), np.tile((1.0, 0.0), (m, 1)), np.ones((m, 3), np.int64),
+        np.zeros((m, 8)), np.zeros(m), np.ones((m, 2, 3), np.int64), np.zeros((0, 3)), np.zeros((0, 3)), 0.0, 0.0,
+    )  # fmt: skip
+    bound, tiles = 0.0, 0.0
+    for index, owner in enumerate(int(o) for o in pieces.owners):
+        kind = int(table.kinds[owner])
+        points = pieces.points[pieces.starts[index] : pieces.starts[index + 1]]
+        homogeneous = np.c_[points, np.ones(len(points))]
+        q = homogeneous @ pieces.planes[index, 3]
+        if kind < 0 or not (q > 0.0).all():
+            continue
+        rows = np.concatenate([table.maps[owner] @ pieces.planes[index, 1:], pieces.planes[index, 3:]])
+        if kind == BILINEAR:
+            rows[:2] -= 0.5 * rows[2]
+        span = float(np.ptp(points, axis=0).sum())
+        wander = float(np.abs(rows[2, :2]).sum() * span / q.max())
+        if wander <= _FACING:
+            rows[2] = 0.0, 0.0, q.mean()
+        else:
+            wander = 0.0
+        reach = (np.abs(homogeneous) @ np.abs(rows[:2]).T / q[:, None]).max(axis=0)
+        reach += uv_reach[owner] * np.abs(table.maps[owner][:, :2]).sum(axis=1)
+        off = (_rounding(pieces.planes[index, 0], view, far) + wander) * float(reach.sum())
+        values = table.params[owner, :6].reshape(2, 3)
+        scale = float(np.abs(colors[owner]).max())
+        if kind in (GRID, BILINEAR):
+            choice = _choose_rows(rows, points, q, kind == BILINEAR)
+            out.ways[index], rows, out.along[index] = choice.way, choice.rows, choice.along
+            h, w, first = out.blocks[index] = table.blocks[owner, int(choice.swapped)]
+            values = table.row_texels[first : first + h * (w + 1)]
+            off = (1.0 + choice.steep) * off + choice.leaves
+            if choice.way in (CLIP, CLIP_BLEND):
+                tiles += _count_tiles(rows, homogeneous)
+        elif kind == SINE:
+            out.ways[index], out.along[index] = WAVE, _across(rows[2])
+            off *= np.pi
+        else:
+            out.ways[index] = PLATE
+            off *= 2.0 * abs(table.params[owner, 6]) * float(reach.max())
+        out.own[index], out.params[index] = rows, table.params[owner]
+        bound = max(bound, scale * float(np.ptp(values, axis=0).max()) * off)
+    return replace(out, texels=table.row_texels, sums=table.row_sums, bound=bound, tiles=tiles)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Choice:
+    """Rows of a texture in the picture: `steep` and `leaves` enter the bound, see `_STEEPEST` and `_ALIGNED`."""
+
+    way: int
+    rows: FloatArray
+    along: FloatArray
+    swapped: bool
+    steep: float
+    leaves: float
+
+
+def _choose_rows(rows: FloatArray, points: FloatArray, q: FloatArray, blend: bool) -> _Choice:
+    """Return the direction along which a row of texels runs, with u and v exchanged where that is needed."""
+    least, span = float(q.min()), float(np.ptp(points, axis=0).sum())
+    for swapped in (False, True):
+        own = rows[[1, 0, 2]] if swapped else rows
+        facing = not own[2, :2].any()
+        along = _across(own[1] if facing else own[2])
+        if facing and not own[1, :2].any():
+            along = own[0, :2] / np.linalg.norm(own[0, :2])
+        leaves = abs(float(own[1, :2] @ along)) * span / least
+        slope = abs(float(own[0, :2] @ along))
+        # how fast u and v change across the rows: their gradients, of (u q - u q) / q, at every corner
+        homogeneous = np.c_[points, np.ones(len(points))]
+        values = homogeneous @ own[:2].T / q[:, None]
+        fastest = float(np.abs(own[None, 0, :2] - values[:, :1] * own[None, 2, :2]).max())
+        if leaves <= _ALIGNED and slope * _STEEPEST > fastest:
+            return _Choice(WALK_BLEND if blend else WALK, own, along, swapped, fastest / slope, leaves)
+        if swapped is False and slope <= 1e-12 * fastest and not own[1].any():
+            # a wave whose crests run along the horizon: its rows are the crests, and what counts texels along them is
+            # of no matter, there is only one
+            crests = np.stack([np.append(along, 0.0) * (least / max(span, 1.0)), own[0], own[2]])
+            leaves = slope * span / least
+            return _Choice(WALK, crests, along, True, 1.0, leaves)
+    return _Choice(CLIP_BLEND if blend else CLIP, rows, np.array([1.0, 0.0]), False, 0.0, 0.0)
+
+
+def _rounding(nearness: FloatArray, view: View, far: float) -> float:
+    """Return the relative error of texture coordinates: five times what extended precision shows for any pose.
+
+    A plane that passes by the camera at a small share of its own size loses that share in its distance.
+    """
+    a, b = nearness[0] * view.scale, nearness[1] * view.scale
+    if not view.perspective:
+        return float(_EPS * (8.0 + np.hypot(a, b)))
+    c = nearness[2] + nearness[0] * view.width / 2 + nearness[1] * view.height / 2
+    return float(_EPS * (8.0 + far * np.sqrt(a * a + b * b + c * c) / 4))
+
+
+def _across(row: FloatArray) -> FloatArray:
+    """Return the unit vector along which a row's value does not change; any where it changes nowhere."""
+    length = float(np.hypot(row[0], row[1]))
+    return np.array([-row[1], row[0]]) / length if length > 0.0 else np.array([1.0, 0.0])
+
+
+def _count_tiles(rows: FloatArray, homogeneous: FloatArray) -> float:
+    """Return the area of a piece in texels, and one for each row."""
+    u, v = (homogeneous @ rows[:2].T / (homogeneous @ rows[2])[:, None]).T
+    return abs(float(u @ np.roll(v, -1) - v @ np.roll(u, -1))) / 2 + float(np.ptp(v)) + 1.0
