@@ -25,8 +25,8 @@ BoolArray = NDArray[np.bool_]
 Triple = tuple[float, float, float]
 
 MARGIN_PX = 4.0  # scenes go on outside the picture; the shutter's bound needs room for what comes in during a slice
-# The near plane's depth over the largest camera coordinate. Nothing divides by the depth of parallel rays, and what lies
-# in the camera's own plane is seen: rounding must not take it for behind.
+# The near plane's depth over the largest camera coordinate. Nothing divides by the depth of parallel rays, and what
+# lies in the camera's own plane is seen: rounding must not take it for behind.
 _NEAR_PERSPECTIVE, _NEAR_PARALLEL = 1e-15, -1e-14
 _PLANES = 5
 
