@@ -54,6 +54,12 @@ if [ ! -e .typing/aliasbench/scenes ]; then
     for folder in bench metrics renderers reports scenes; do ln -sfn "../../$folder" ".typing/aliasbench/$folder"; done
 fi
 
-if [ "${1:-}" = browser ] && ! command -v chromium >/dev/null 2>&1; then
-    install chromium || say "chromium is missing and cannot be installed from here: the browser tests will fail (apt-get install chromium)"
+if [ "${1:-}" = browser ]; then
+    missing=""
+    command -v chromium >/dev/null 2>&1 || missing="$missing chromium"
+    has_library libatomic.so.1 || missing="$missing libatomic1"  # what drives the browser needs it
+    if [ -n "$missing" ]; then
+        # shellcheck disable=SC2086
+        install $missing || say "the browser tests will fail; run as root: apt-get install$missing"
+    fi
 fi
