@@ -6,6 +6,7 @@ from time import monotonic
 from aliasbench.bench.run import Step
 from aliasbench.bench.wording import duration, printable
 
+FEW = 0.02  # of the steps: until they are done, compiling and other beginnings would pass for the pace of the rest
 SILENCE_S = 30.0  # at most between two lines while one thing goes on
 
 
@@ -35,7 +36,7 @@ class ProgressLog:
         if step.total == 0:
             return printable(step.doing)
         text = f"[{step.done}/{step.total}] {printable(step.doing)}"
-        if 0 < step.done < step.total:
+        if FEW * step.total <= step.done < step.total and step.done > 0:
             left = (now - self._begun) / step.done * (step.total - step.done)
             text += f", about {duration(max(round(left), 1))} left"
         return text

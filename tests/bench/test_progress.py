@@ -19,3 +19,11 @@ def test_a_line_is_said_when_something_begins_with_the_time_that_is_left() -> No
 
 def test_a_remark_that_counts_nothing_is_said_without_numbers() -> None:
     assert ProgressLog(lambda: 0.0).line(Step("nothing left to do", 0, 0)) == "nothing left to do"
+
+
+def test_no_time_is_foretold_from_the_first_few_steps_which_compile() -> None:
+    times = iter((0.0, 11.0, 12.0))
+    log = ProgressLog(lambda: next(times))
+    assert log.line(Step("one", 0, 1000)) == "[0/1000] one"
+    assert log.line(Step("two", 1, 1000)) == "[1/1000] two"
+    assert log.line(Step("three", 20, 1000)) == "[20/1000] three, about 10 min left"
