@@ -2,9 +2,15 @@
 
 Image coordinates: x to the right and y down, in pixels, (0, 0) the top left corner of the picture, pixel (i, j) covers
 [j, j + 1) x [i, i + 1); the camera's axis meets the picture at (width / 2, height / 2).
+
+A thin lens adds nothing but a family of such views. Of a lens focused at F, the ray through its point (a, b) that meets
+the pinhole's ray in the plane at depth F is at depth Z off that ray by (a, b) (1 - Z / F), with a pinhole and with
+parallel rays alike. A world point at (X, Y, Z) is therefore seen from there where the pinhole sees
+(X - a (1 - Z / F), Y - b (1 - Z / F), Z): camera coordinates being scalar products with the axes, that is the view from
+origin + a right + b up whose axes are right + (a / F) forward and up + (b / F) forward (`lens_view`).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,12 +27,15 @@ class View:
     origin : (3,) float64
         The camera's position in the world.
     right, up, forward : (3,) float64
-        Orthonormal axes; `up` is up in the picture.
+        Axes: camera coordinates are the scalar products with them; `up` is up in the picture. Orthonormal, but for
+        `shear` times forward in right and up.
     perspective : bool
     scale : float
         Orthographic: pixels per world unit. Perspective: pixels at distance 1 along the axis (the focal length).
     width, height : int
         Picture size in pixels.
+    shear : (float, float)
+        What right and up have of forward: (0, 0) but off the centre of a lens.
     """
 
     origin: FloatArray
@@ -37,6 +46,7 @@ class View:
     scale: float
     width: int
     height: int
+    shear: tuple[float, float] = (0.0, 0.0)
 
     def to_camera(self, points: FloatArray) -> FloatArray:
         """Return (..., 3) coordinates along right, up and forward of world points (..., 3)."""
@@ -59,10 +69,13 @@ class View:
         """Return origins and directions (..., 3) in the world through image points; a direction's depth is 1."""
         a = (np.asarray(x, dtype=np.float64)[..., None] - self.width / 2) / self.scale
         b = (self.height / 2 - np.asarray(y, dtype=np.float64)[..., None]) / self.scale
-        plane = a * self.right + b * self.up
+        # the axes' dual vectors: each has a scalar product of 1 with its own axis and 0 with the others
+        right, up = (axis - s * self.forward for axis, s in zip((self.right, self.up), self.shear, strict=True))
+        forward = self.forward - self.shear[0] * right - self.shear[1] * up
+        plane = a * right + b * up
         if self.perspective:
-            return np.broadcast_to(self.origin, plane.shape), plane + self.forward
-        return self.origin + plane, np.broadcast_to(self.forward, plane.shape)
+            return np.broadcast_to(self.origin, plane.shape), plane + forward
+        return self.origin + plane, np.broadcast_to(forward, plane.shape)
 
 
 def view_at(camera: Camera, animation: Animation, frame: int, fraction: float, size: tuple[int, int]) -> View:
@@ -98,3 +111,34 @@ def view_at(camera: Camera, animation: Animation, frame: int, fraction: float, s
             raise InputError("camera: a perspective camera needs fov_y_deg (degrees from bottom to top)")
         scale = height / 2 / np.tan(np.radians(camera.fov_y_deg) / 2)
     return View(origin, right, up, forward, camera.projection == "perspective", float(scale), width, height)
+
+
+def focus_at(camera: Camera, animation: Animation, frame: int, fraction: float) -> float:
+    """Return the distance along the axis of the plane in focus at a time: the target's where none is given."""
+    if camera.focus_distance is not None:
+        return camera.focus_distance
+    velocity = np.asarray(camera.velocity, dtype=np.float64)
+    drift = np.zeros(3) if camera.target_velocity is None else np.asarray(camera.target_velocity) - velocity
+    axis = np.asarray(camera.target, dtype=np.float64) - np.asarray(camera.position)
+    return float(np.linalg.norm(axis + drift * ((frame + fraction) / animation.fps)))
+
+
+def lens_view(view: View, a: float, b: float, focus: float) -> View:
+    """Return what a camera sees through one point of its lens.
+
+    Parameters
+    ----------
+    view : View
+        Through the centre of the lens.
+    a, b : float
+        The point on the lens, in world units along right and up.
+    focus : float
+        Distance along the axis of the plane in focus, above 0: its points do not move in the picture.
+    """
+    return replace(
+        view,
+        origin=view.origin + a * view.right + b * view.up,
+        right=view.right + a / focus * view.forward,
+        up=view.up + b / focus * view.forward,
+        shear=(a / focus, b / focus),
+    )

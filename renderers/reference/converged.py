@@ -1,9 +1,10 @@
 """References of textured scenes: exact where they can be, else a mean of replicates with a bound of 99 % confidence.
 
-At an instant the box filter is exact (`textured`). Other filters add an unbiased estimate of a small rest (`weighted`),
-an open shutter averages exact instants from strata of the shutter, two to a stratum as mirror images, so that what is
-linear in time cancels; replicates share the finest strata, which makes their spread too large rather than too small.
-What would take too many clips is integrated exactly along lines (`scanlines`) and sampled across them.
+At an instant the box filter is exact (`textured`), and every separable filter is as good as that (`smoothed`); the
+cone, and what would take too much work, adds an unbiased estimate of a small rest (`weighted`). An open shutter
+averages exact instants from strata of the shutter, two to a stratum as mirror images, so that what is linear in time
+cancels; replicates share the finest strata, which makes their spread too large rather than too small. What would take
+too many clips is integrated exactly along lines (`scanlines`) and sampled across them.
 
 The bound of a value is Student's t times its standard error. "All pixels at once" is taken literally: the quantile is
 Bonferroni's for every channel of every pixel, 1 - 0.01 / (2 m). Pooling variances over pixels would be smaller and
@@ -18,14 +19,16 @@ from scipy.special import stdtrit
 
 from aliasbench.renderers.reference.cache import Stored
 from aliasbench.renderers.reference.faces import Faces
-from aliasbench.renderers.reference.filtered import is_pixel_box
+from aliasbench.renderers.reference.filtered import is_pixel_box, wide_view
 from aliasbench.renderers.reference.flat import over_bands, palette, scene_extent
 from aliasbench.renderers.reference.pans import average_slide, is_even_motion
 from aliasbench.renderers.reference.paths import Paths
 from aliasbench.renderers.reference.pieces import join_pieces, pieces_at
 from aliasbench.renderers.reference.scanlines import scan_rows
+from aliasbench.renderers.reference.smoothed import draw_smoothed
+from aliasbench.renderers.reference.surfaces import WALK, WALK_BLEND
 from aliasbench.renderers.reference.texture_tables import TextureTable, texture_table
-from aliasbench.renderers.reference.textured import draw_textured, instant_of
+from aliasbench.renderers.reference.textured import Instant, draw_textured, instant_of
 from aliasbench.renderers.reference.weighted import Cells, build_cells, sample_rest
 from aliasbench.renderers.sampling.filters import FilterSpec
 from aliasbench.renderers.sampling.hashing import combine, permute, unit
@@ -36,7 +39,9 @@ REPLICATES = 16
 _LINES = 64  # of a row in a replicate, at 256 x 256; the work is the same at other sizes
 _TIMES = 32
 _CONFIDENCE = 0.99
-_STRATA_WORK, _MOST_STRATA = 2**16, 32  # pixels of a replicate, of strata of the shutter
+_MOST_STRATA = 64  # of the shutter, in a replicate
+# Prices in nanoseconds, measured; they choose the number of strata, so they are constants and not clocks.
+_BUDGET, _PIXEL_COST, _CROSSING_COST, _TILE_COST, _PIECE_COST = 3e10, 1500.0, 40.0, 100.0, 2e5
 _CELL_WORK, _MOST_CELLS = 2**24, 21  # cells under all filters of a replicate; to a pixel along one axis
 _FLOOR = 1e-9  # for the rounding of what is averaged
 
@@ -64,10 +69,15 @@ def converge(
     def snapshot(fraction: float) -> "_Snapshot":
         return _Snapshot(scene, faces, paths, size, frame, fraction, table, cells)
 
-    if spread and cells is None:
-        slide = _slide(scene, faces, paths, size, frame, table)
+    if spread:
+        slide = _slide(scene, faces, paths, size, frame, table, spec)
         if slide is not None:
             return slide
+    elif cells is not None and spec.kind.separable:
+        view = wide_view(view_at(scene.camera, scene.animation, frame, shutter / 2, size), spec)
+        smooth = draw_smoothed(instant_of(scene, faces, paths, view, frame, shutter / 2, table), spec)
+        if smooth is not None:
+            return Stored(smooth.pixels, float(smooth.bound.max()), 0)
     middle = snapshot(shutter / 2)
     if middle.bound is None and cells is None:
         return _by_lines(scene, faces, paths, size, frame, table, spread=spread)
@@ -75,7 +85,7 @@ def converge(
         if cells is None and middle.bound is not None:
             return Stored(middle.base, middle.bound, 0)
         return _average(lambda replicate: middle.picture(replicate), size, 1, middle.bound or 0.0)
-    strata = int(np.clip(_STRATA_WORK // (size[0] * size[1]), 1, _MOST_STRATA))
+    strata = int(np.clip(_BUDGET / (2 * REPLICATES * _price(middle.instant)), 1, _MOST_STRATA))
 
     def one(replicate: int) -> FloatArray:
         total = np.zeros((size[1], size[0], 3))
@@ -91,18 +101,45 @@ def converge(
 
 
 def _slide(
-    scene: Scene, faces: Faces, paths: Paths, size: tuple[int, int], frame: int, table: TextureTable
+    scene: Scene, faces: Faces, paths: Paths, size: tuple[int, int], frame: int, table: TextureTable, spec: FilterSpec
 ) -> Stored | None:
     """Return the exact mean over the open shutter where textures only slide along their rows."""
-    if not is_even_motion(paths, frame):
+    if not is_even_motion(paths, frame) or not spec.kind.separable:
         return None
     begin, end = (
-        instant_of(scene, faces, paths, view_at(scene.camera, scene.animation, frame, f, size), frame, f, table)
+        instant_of(
+            scene,
+            faces,
+            paths,
+            wide_view(view_at(scene.camera, scene.animation, frame, f, size), spec),
+            frame,
+            f,
+            table,
+        )
         for f in (0.0, scene.animation.shutter)
     )
     slide = average_slide(begin, end)
-    exact = None if slide is None else draw_textured(slide)
+    if slide is None:
+        return None
+    exact = draw_textured(slide) if is_pixel_box(spec) else draw_smoothed(slide, spec)
     return None if exact is None else Stored(exact.pixels, float(exact.bound.max()), 0)
+
+
+def _price(instant: Instant) -> float:
+    """Return about how many nanoseconds the exact picture of an instant takes: rows of texels cross every column."""
+    pieces, surfaces, view = instant.pieces, instant.surfaces, instant.view
+    crossings = 0.0
+    for m in np.flatnonzero((surfaces.ways == WALK) | (surfaces.ways == WALK_BLEND)):
+        points = pieces.points[pieces.starts[m] : pieces.starts[m + 1]]
+        homogeneous = np.c_[points, np.ones(len(points))]
+        rows = float(np.ptp(homogeneous @ surfaces.own[m, 1] / (homogeneous @ surfaces.own[m, 2])))
+        crossings += 2 * rows * min(view.width, float(np.ptp(points[:, 0])) + 1.0)
+    return (
+        _PIXEL_COST * view.width * view.height
+        + _CROSSING_COST * crossings
+        + _TILE_COST * surfaces.tiles
+        + _PIECE_COST * len(pieces.owners)
+    )
 
 
 def _cells_each(spec: FilterSpec, size: tuple[int, int], *, spread: bool) -> int:

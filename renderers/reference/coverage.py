@@ -50,7 +50,7 @@ def cover_rows(
                     continue
                 total[:] = 0.0
                 comp[:] = 0.0
-                work += _pixel(
+                work += cover_pixel(
                     points, starts, planes, owners, colors, perspective, extent, ids[begin:], count,
                     float(column), float(row), total, comp,
                 )  # fmt: skip
@@ -165,7 +165,7 @@ def _solid_extent(points: FloatArray, begin: int, end: int, row: int) -> tuple[f
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _pixel(
+def cover_pixel(
     points: FloatArray, starts: IntArray, planes: FloatArray, owners: IntArray, colors: FloatArray, perspective: bool,
     extent: float, cand: IntArray, n: int, x: float, y: float, total: FloatArray, comp: FloatArray,
 ) -> int:  # fmt: skip

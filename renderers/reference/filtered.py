@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from aliasbench.renderers.reference.borders import BASE, COUNT, trace_pixel
 from aliasbench.renderers.reference.coverage import band_candidates, row_candidates
 from aliasbench.renderers.reference.faces import Faces
-from aliasbench.renderers.reference.flat import Integral, draw_instant, over_bands, palette, scene_extent
+from aliasbench.renderers.reference.flat import Integral, draw_view, over_bands, palette, scene_extent
 from aliasbench.renderers.reference.masses import QUADRATURE, cell_masses, cell_peaks, rules_of, run_masses
 from aliasbench.renderers.reference.paths import Paths
 from aliasbench.renderers.reference.pieces import Pieces, pieces_at
@@ -37,7 +37,24 @@ def draw_filtered(
 ) -> Integral:
     """Return the exact picture at one instant under a filter.
 
-    The box of one pixel takes `flat.draw_instant`, which needs no margin.
+    The box of one pixel takes `flat.draw_view`, which needs no margin.
+
+    Raises
+    ------
+    InputError
+        For a filter that reaches over more than `LARGEST_MARGIN` pixels.
+    """
+    view = view_at(scene.camera, scene.animation, frame, fraction, size)
+    return draw_instant_view(scene, faces, paths, view, frame, fraction, spec)
+
+
+def draw_instant_view(
+    scene: Scene, faces: Faces, paths: Paths, view: View, frame: int, fraction: float, spec: FilterSpec
+) -> Integral:
+    """Return the exact picture of one instant in a given view, whose axes may be sheared.
+
+    A point's camera coordinates are its products with the view's axes, whatever these are: a view through a place of a
+    lens has axes that are not at right angles.
 
     Raises
     ------
@@ -45,10 +62,10 @@ def draw_filtered(
         For a filter that reaches over more than `LARGEST_MARGIN` pixels.
     """
     if is_pixel_box(spec):
-        return draw_instant(scene, faces, paths, size, frame, fraction)
-    view = wide_view(view_at(scene.camera, scene.animation, frame, fraction, size), spec)
-    pixels = np.zeros((size[1], size[0], 3))
-    bound = add_filtered(scene, view, pieces_at(faces, paths, view, frame, fraction), np.ones(1), spec, pixels)
+        return draw_view(scene, view, pieces_at(faces, paths, view, frame, fraction))
+    pixels = np.zeros((view.height, view.width, 3))
+    wide = wide_view(view, spec)
+    bound = add_filtered(scene, wide, pieces_at(faces, paths, wide, frame, fraction), np.ones(1), spec, pixels)
     return Integral(pixels, np.full(pixels.shape[:2], bound))
 
 

@@ -65,17 +65,18 @@ def cut_convex(
 @njit(cache=True, nogil=True, error_model="numpy")
 def split_pixel(
     points: FloatArray, starts: IntArray, planes: FloatArray, owners: IntArray, perspective: bool, extent: float,
-    cand: IntArray, n: int, x: float, y: float, polys: FloatArray, sizes: IntArray, shown: IntArray,
+    cand: IntArray, n: int, x0: float, y0: float, x1: float, y1: float, polys: FloatArray, sizes: IntArray,
+    shown: IntArray,
 ) -> int:  # fmt: skip
-    """Fill the fragments of a pixel and the piece that each shows (-1: the background); return how many they are.
+    """Fill the fragments of a rectangle and the piece that each shows (-1: the background); return how many they are.
 
     Returns -1 where `polys` (fragments, corners, 2) has too little room.
     """
     room, corners = polys.shape[0], polys.shape[1]
-    polys[0, 0, 0], polys[0, 0, 1] = x, y
-    polys[0, 1, 0], polys[0, 1, 1] = x + 1.0, y
-    polys[0, 2, 0], polys[0, 2, 1] = x + 1.0, y + 1.0
-    polys[0, 3, 0], polys[0, 3, 1] = x, y + 1.0
+    polys[0, 0, 0], polys[0, 0, 1] = x0, y0
+    polys[0, 1, 0], polys[0, 1, 1] = x1, y0
+    polys[0, 2, 0], polys[0, 2, 1] = x1, y1
+    polys[0, 3, 0], polys[0, 3, 1] = x0, y1
     sizes[0], shown[0] = 4, -1
     total = 1
     work = np.empty((2, corners, 2))
@@ -135,6 +136,21 @@ def split_pixel(
                 sizes[total], shown[total] = back, before
                 total += 1
     return total
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def between(ids: IntArray, left: FloatArray, right: FloatArray, n: int, x0: float, x1: float, out: IntArray) -> int:
+    """Write those of n pieces that reach into (x0, x1); return how many.
+
+    A count that starts from 0 where it is used would be a type of its own, for which all that takes it is compiled
+    once more.
+    """
+    count = 0
+    for a in range(n):
+        if left[a] < x1 and right[a] > x0:
+            out[count] = ids[a]
+            count += 1
+    return count
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

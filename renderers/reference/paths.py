@@ -83,34 +83,6 @@ class Paths:
             out += turning * 1.1 * (np.linalg.norm(camera, axis=1) + out)
         return out
 
-    def velocities(self, world: FloatArray, ranges: tuple[slice, ...], frame: int, fraction: float) -> FloatArray:
-        """Return the velocities (n, 3) relative to the camera of points at present at `world`, per frame interval.
-
-        For velocity and spin; not for matrices.
-        """
-        fps = self.animation.fps
-        eye = np.asarray(self.camera.velocity) / fps
-        out = np.tile(-eye, (len(world), 1))
-        for motion, rows in zip(self.motions, ranges, strict=True):
-            step = np.asarray(motion.velocity) / fps
-            out[rows] += step
-            if motion.spin is not None:
-                axis = np.asarray(motion.spin.axis) / np.linalg.norm(motion.spin.axis)
-                center = np.asarray(motion.spin.center) + step * (frame + fraction)
-                out[rows] += np.cross(2 * np.pi * motion.spin.rev_per_s / fps * axis, world[rows] - center)
-        return out
-
-    def velocity_change(self, ranges: tuple[slice, ...], speeds: FloatArray) -> FloatArray:
-        """Return bounds (n,) on how fast the speed across an edge of a turning body changes, per interval squared.
-
-        The velocity turns with the body, and so does the edge: each adds at most angular speed times speed.
-        """
-        out = np.zeros(len(speeds))
-        for motion, rows in zip(self.motions, ranges, strict=True):
-            if motion.spin is not None:
-                out[rows] = 2 * np.pi * abs(motion.spin.rev_per_s) / self.animation.fps * speeds[rows]
-        return out
-
     def camera_turn(self, frame: int) -> float:
         """Return a bound on the camera's angular speed over a frame interval, in radians per frame interval."""
         target_velocity = self.camera.target_velocity

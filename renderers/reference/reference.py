@@ -1,8 +1,15 @@
 """The reference renderer: the exact picture of a scene, or one that states how far off it may be.
 
-Three ways, chosen by the scene: flat colours at an instant are exact up to rounding; flat colours over an open shutter
-carry a certified bound; textures at an instant are exact too, and moving ones are sampled in time, with a bound of 99 %
-confidence that holds for all pixels at once. The seed changes nothing.
+Nothing made of unlit and diffuse surfaces is refused. What is drawn how, and what `Frame.uncertainty` then means:
+
+* Flat colours through a pinhole: exact at an instant, certified over an open shutter ("bound").
+* Textures through a pinhole: exact or certified at an instant where that is affordable, else sampled ("confidence").
+* Lights, through a pinhole at an instant: certified ("bound"), or sampled where the bound stays wide.
+* A lens: the pinhole's picture where all is in focus; layers that face the camera certified (`defocus`, "bound").
+* All else, lens, shutter and light together: averages over both (`averaged`, "confidence").
+* Images with cut-outs become geometry first (`cutouts`), or are sampled where their borders are curves.
+
+"confidence" is 99 % for all pixels at once. The seed changes nothing.
 """
 
 import time
@@ -13,25 +20,34 @@ from typing import Self
 import numpy as np
 
 from aliasbench.renderers.frame import Frame
+from aliasbench.renderers.reference.averaged import average
 from aliasbench.renderers.reference.cache import Stored, fetch
+from aliasbench.renderers.reference.cutouts import expand
+from aliasbench.renderers.reference.defocus import draw_layers, is_in_focus
 from aliasbench.renderers.reference.faces import Faces, build_faces
-from aliasbench.renderers.reference.filtered import draw_filtered, is_pixel_box, wide_view
-from aliasbench.renderers.reference.flat import Integral, draw_shutter
+from aliasbench.renderers.reference.filtered import draw_filtered, wide_view
+from aliasbench.renderers.reference.flat import Integral
 from aliasbench.renderers.reference.paths import Paths, scene_paths
+from aliasbench.renderers.reference.snapshots import FlatPictures, LitPictures, Shot, TexturedPictures
 from aliasbench.renderers.sampling.filters import FilterSpec, filter_of
 from aliasbench.renderers.technique import Technique
 from aliasbench.scenes.errors import NotAvailableError
 from aliasbench.scenes.model import Scene, content_digest
 from aliasbench.scenes.projection import view_at
 
-ALGORITHM = 2  # changes with anything that changes a reference's pixels: stored ones are not used then
+ALGORITHM = 3  # changes with anything that changes a reference's pixels: stored ones are not used then
+_WIDE = 1e-3  # a bound beyond which sampling may do better
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PreparedReference:
-    """A scene ready for its references; see `renderers.frame.Prepared`."""
+    """A scene ready for its references; see `renderers.frame.Prepared`.
+
+    `scene` is as given; `drawn` has its cut-outs as geometry, and is None where that cannot be.
+    """
 
     scene: Scene
+    drawn: Scene | None
     technique: Technique
     spec: FilterSpec
     size: tuple[int, int]
@@ -43,19 +59,11 @@ class PreparedReference:
         """Return the reference of frame number `frame`."""
         start = time.perf_counter()
         shown = 0 if self.scene.is_static else frame
-        textured = any(o.texture is not None for o in self.scene.objects)
-        if textured:
-            stored = fetch(self.key(shown), lambda: self._textured(shown))
-        elif self.shutter_open:
-            stored = fetch(
-                self.key(shown), lambda: _stored(draw_shutter(self.scene, self.faces, self.paths, self.size, shown))
-            )
+        plain = self.drawn is not None and not (_is_textured(self.drawn) or self.scene.lights or self.shutter_open)
+        if plain and not self._blurs(shown):
+            stored = self._at_once(shown)
         else:
-            stored = _stored(
-                draw_filtered(
-                    self.scene, self.faces, self.paths, self.size, shown, self.scene.animation.shutter / 2, self.spec
-                )
-            )
+            stored = fetch(self.key(shown), lambda: self._make(shown))
         return Frame(
             pixels=stored.pixels,
             seconds=time.perf_counter() - start,
@@ -75,13 +83,80 @@ class PreparedReference:
     def shutter_open(self) -> bool:
         return self.scene.animation.shutter > 0.0 and self.technique.time == "spread" and not self.scene.is_static
 
-    def _textured(self, frame: int) -> Stored:
-        from aliasbench.renderers.reference.converged import converge
+    @property
+    def _fractions(self) -> tuple[float, float]:
+        """The first and last fraction of the frame interval that count."""
+        shutter = self.scene.animation.shutter
+        return (0.0, shutter) if self.shutter_open else (shutter / 2, shutter / 2)
 
-        return converge(
-            self.scene, self.faces, self.paths, self.size, frame, self.spec,
-            linear=self.technique.texture == "linear", spread=self.shutter_open,
-        )  # fmt: skip
+    @property
+    def _linear(self) -> bool:
+        return self.technique.texture == "linear"
+
+    def _blurs(self, frame: int) -> bool:
+        """Return whether the lens changes anything."""
+        return self.scene.camera.lens_radius > 0.0 and not is_in_focus(
+            self.scene, self.faces, self.paths, frame, self._fractions
+        )
+
+    def _at_once(self, frame: int) -> Stored:
+        """Return the flat-coloured picture of an instant, through a pinhole."""
+        scene = self.scene if self.drawn is None else self.drawn
+        return _stored(draw_filtered(scene, self.faces, self.paths, self.size, frame, self._fractions[0], self.spec))
+
+    def _make(self, frame: int) -> Stored:
+        scene, faces, paths, spec, linear = self.drawn, self.faces, self.paths, self.spec, self._linear
+        if scene is None:
+            from aliasbench.renderers.reference.cutout_samples import sample_cutouts
+
+            shot = Shot(self.scene, faces, paths, self.size, frame, spec)
+            return sample_cutouts(shot, linear=linear, shutter=self._fractions)
+        blurs, textured = self._blurs(frame), _is_textured(scene)
+        if scene.lights:
+            return self._lit(scene, frame, blurs=blurs)
+        if blurs:
+            layers = None
+            if not textured and not self.shutter_open:
+                layers = draw_layers(scene, faces, paths, self.size, frame, self._fractions[0], spec)
+            return self._averaged(scene, frame, blurs=True) if layers is None else _stored(layers)
+        if textured:
+            from aliasbench.renderers.reference.converged import converge
+
+            return converge(scene, faces, paths, self.size, frame, spec, linear=linear, spread=self.shutter_open)
+        if self.shutter_open:
+            from aliasbench.renderers.reference.moving import draw_shutter
+
+            return _stored(draw_shutter(scene, faces, paths, self.size, frame, spec))
+        return self._at_once(frame)
+
+    def _lit(self, scene: Scene, frame: int, *, blurs: bool) -> Stored:
+        """Return the picture of a scene with lights."""
+        from aliasbench.renderers.reference.lit import draw_lit
+
+        if blurs or self.shutter_open:
+            return self._averaged(scene, frame, blurs=blurs)
+        fraction = self._fractions[0]
+        view = view_at(scene.camera, scene.animation, frame, fraction, self.size)
+        certified = _stored(
+            draw_lit(scene, self.faces, self.paths, view, frame, fraction, self.spec, linear=self._linear)
+        )
+        if certified.uncertainty <= _WIDE:
+            return certified
+        sampled = self._averaged(scene, frame, blurs=False)
+        return min(certified, sampled, key=lambda stored: stored.uncertainty)
+
+    def _averaged(self, scene: Scene, frame: int, *, blurs: bool) -> Stored:
+        """Return the average over lens and shutter of pictures drawn one by one."""
+        from aliasbench.renderers.reference.texture_tables import texture_table
+
+        shot = Shot(scene, self.faces, self.paths, self.size, frame, self.spec)
+        pictures: FlatPictures | LitPictures | TexturedPictures = FlatPictures(shot)
+        if scene.lights:
+            pictures = LitPictures(shot, self._linear)
+        elif _is_textured(scene):
+            pictures = TexturedPictures(shot, texture_table(scene, linear=self._linear))
+        radius = scene.camera.lens_radius if blurs else 0.0
+        return average(pictures, lens_radius=radius, shutter=self._fractions, key=frame)
 
     def __enter__(self) -> Self:
         return self
@@ -90,6 +165,10 @@ class PreparedReference:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         return None
+
+
+def _is_textured(scene: Scene) -> bool:
+    return any(o.texture is not None for o in scene.objects)
 
 
 def _stored(integral: Integral) -> Stored:
@@ -115,24 +194,24 @@ def prepare_reference(scene: Scene, technique: Technique, size: tuple[int, int])
     start = time.perf_counter()
     spec = filter_of(technique)
     _refuse_missing(scene)
-    paths = scene_paths(scene, interpolated=technique.motion == "matrix")
-    wide_view(view_at(scene.camera, scene.animation, 0, 0.0, size), spec)
-    prepared = PreparedReference(scene, technique, spec, size, build_faces(scene), paths, time.perf_counter() - start)
-    if not is_pixel_box(spec) and prepared.shutter_open and all(o.texture is None for o in scene.objects):
+    drawn = expand(scene, linear=technique.texture == "linear")
+    if drawn is None and scene.lights:
         raise NotAvailableError(
-            f"reference: filter={technique.filter} of radius {technique.radius_px:g} is not available yet for "
-            "an open shutter; available: filter=box,radius=0.5"
+            "reference: lights on images that are cut out along curves (alpha_cutoff with texture=linear), or into "
+            "more faces than can be built, are not available yet; available: texture=point with fewer texels"
         )
-    return prepared
+    shown = scene if drawn is None else drawn
+    paths = scene_paths(shown, interpolated=technique.motion == "matrix")
+    wide_view(view_at(scene.camera, scene.animation, 0, 0.0, size), spec)
+    seconds = time.perf_counter() - start
+    return PreparedReference(scene, drawn, technique, spec, size, build_faces(shown), paths, seconds)
 
 
 def _refuse_missing(scene: Scene) -> None:
     """Raise for what a scene has and references do not have yet."""
-    available = "available: unlit objects (diffuse without lights) seen through a pinhole or orthographic camera"
-    if scene.camera.lens_radius > 0.0:
-        raise NotAvailableError(f"reference: a lens (lens_radius) is not available yet; {available}")
-    if scene.lights:
-        raise NotAvailableError(f"reference: lights are not available yet; {available}")
     for surface in scene.objects:
         if surface.material.kind not in ("unlit", "diffuse"):
-            raise NotAvailableError(f"reference: material {surface.material.kind} is not available yet; {available}")
+            raise NotAvailableError(
+                f"reference: material {surface.material.kind} is not available yet; "
+                "available: unlit and diffuse, with or without lights"
+            )

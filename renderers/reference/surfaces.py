@@ -147,7 +147,7 @@ def _choose_rows(rows: FloatArray, points: FloatArray, q: FloatArray, blend: boo
         own = rows[[1, 0, 2]] if swapped else rows
         facing = not own[2, :2].any()
         along = _across(own[1] if facing else own[2])
-        if facing and not own[1, :2].any():
+        if facing and not own[1, :2].any() and own[0, :2].any():
             along = own[0, :2] / np.linalg.norm(own[0, :2])
         leaves = abs(float(own[1, :2] @ along)) * span / least
         slope = abs(float(own[0, :2] @ along))

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from aliasbench.renderers.reference.coverage import row_extent
 from aliasbench.renderers.reference.faces import Faces
 from aliasbench.renderers.reference.flat import Integral, over_bands, palette, scene_extent
-from aliasbench.renderers.reference.fragments import convex_area, split_pixel
+from aliasbench.renderers.reference.fragments import between, convex_area, split_pixel
 from aliasbench.renderers.reference.paths import Paths
 from aliasbench.renderers.reference.pieces import Pieces, pieces_at
 from aliasbench.renderers.reference.surfaces import (
@@ -109,15 +109,11 @@ def texture_rows(
                 ids[n], left[n], right[n] = i, lo, hi
                 n += 1
         for column in range(width):
-            here = 0
-            for a in range(n):
-                if left[a] < column + 1 and right[a] > column:
-                    cand[here] = ids[a]
-                    here += 1
+            here = between(ids, left, right, n, float(column), column + 1.0, cand)
             while True:
                 fragments = split_pixel(
                     points, starts, planes, owners, perspective, extent, cand, here, float(column), float(row),
-                    polys, sizes, shown,
+                    column + 1.0, row + 1.0, polys, sizes, shown,
                 )  # fmt: skip
                 if fragments >= 0:
                     break

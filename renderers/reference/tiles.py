@@ -20,7 +20,7 @@ IntArray = NDArray[np.int64]
 MOST_NODES = 64
 MOST_EVALUATIONS = 400_000  # of a fragment of a zone plate: about seventy cycles to a pixel, each way
 _TILE_NODES = 5
-_CHANGE = 1.0 / 16.0  # of q within one rule: what is left of 1 / q is under 66^-10
+MOST_CHANGE = 1.0 / 16.0  # of q within one rule: what is left of 1 / q is under 66^-10
 
 
 @lru_cache(maxsize=1)
@@ -45,7 +45,7 @@ def clip_texels(
     rest, spare, strip, tile, left = work[0], work[1], work[2], work[3], work[4]
     size = n
     copy_corners(poly, n, rest)
-    low, high = _range(v, q, rest, size)
+    low, high = texel_range(v, q, rest, size)
     j = low
     while size > 0:
         if j < high:
@@ -58,7 +58,7 @@ def clip_texels(
         if in_strip > 0:
             here = offset + wrap(first_row + j, height) * (width + 1)
             above = offset + wrap(first_row + j + 1.0, height) * (width + 1)
-            i, last = _range(u, q, strip, in_strip)
+            i, last = texel_range(u, q, strip, in_strip)
             while in_strip > 0:
                 if i < last:
                     d = (i + 1.0) * q - u
@@ -80,7 +80,7 @@ def clip_texels(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _range(u: FloatArray, q: FloatArray, poly: FloatArray, n: int) -> tuple[float, float]:
+def texel_range(u: FloatArray, q: FloatArray, poly: FloatArray, n: int) -> tuple[float, float]:
     """Return the first and last whole number below u / q over a polygon."""
     low, high = np.inf, -np.inf
     for k in range(n):
@@ -97,17 +97,17 @@ def _blend_tile(
     """Add the integral of the blend of four texels over a polygon between their centres."""
     stack = np.empty((256, 4, 2))
     quad = np.empty((4, 2))
-    depth = _fan(tile, n, stack)
+    depth = fan_quads(tile, n, stack)
     while depth > 0:
         depth -= 1
         copy_corners(stack[depth], 4, quad)
-        if depth + 4 <= len(stack) and _change(q, quad) > _CHANGE:
-            _quarter(quad, stack[depth : depth + 4])
+        if depth + 4 <= len(stack) and relative_change(q, quad) > MOST_CHANGE:
+            quarter_quad(quad, stack[depth : depth + 4])
             depth += 4
             continue
         for g in range(_TILE_NODES):
             for h in range(_TILE_NODES):
-                x, y, area = _point(quad, rules[_TILE_NODES, 0, g], rules[_TILE_NODES, 0, h])
+                x, y, area = point_of(quad, rules[_TILE_NODES, 0, g], rules[_TILE_NODES, 0, h])
                 area *= rules[_TILE_NODES, 1, g] * rules[_TILE_NODES, 1, h]
                 qs = linear_at(q, x, y)
                 s, t = linear_at(u, x, y) / qs, linear_at(v, x, y) / qs
@@ -124,7 +124,7 @@ def integrate_zone(
     """Return the integral of cos(k (u^2 + v^2) + phase) over a fragment, and the area given up as too fine."""
     stack = np.empty((512, 4, 2))
     quad = np.empty((4, 2))
-    depth = _fan(poly, n, stack)
+    depth = fan_quads(poly, n, stack)
     total, lost, work = 0.0, 0.0, 0
     while depth > 0:
         depth -= 1
@@ -133,14 +133,13 @@ def integrate_zone(
             lost += abs(convex_area(quad, 4))
             continue
         work += 144
-        fastest, bend = _phase_rates(quad, own, k)
-        across = max(_length(quad, 0, 1), _length(quad, 3, 2))
-        down = max(_length(quad, 0, 3), _length(quad, 1, 2))
+        fastest, bend = phase_rates(quad, own, k)
+        across, down = longest_sides(quad)
         a, b = 0.65 * fastest * across, 0.65 * fastest * down
         nodes = 0.8 * max(a, b) + 12.0
-        if nodes > MOST_NODES or _change(own[2], quad) > _CHANGE or bend * max(across, down) ** 2 > 2.0:
+        if nodes > MOST_NODES or relative_change(own[2], quad) > MOST_CHANGE or bend * max(across, down) ** 2 > 2.0:
             if depth + 4 <= len(stack):
-                _quarter(quad, stack[depth : depth + 4])
+                quarter_quad(quad, stack[depth : depth + 4])
                 depth += 4
             else:
                 lost += abs(convex_area(quad, 4))
@@ -149,7 +148,7 @@ def integrate_zone(
         work += m * o
         for g in range(m):
             for h in range(o):
-                x, y, area = _point(quad, rules[m, 0, g], rules[o, 0, h])
+                x, y, area = point_of(quad, rules[m, 0, g], rules[o, 0, h])
                 q = linear_at(own[2], x, y)
                 u, v = linear_at(own[0], x, y) / q, linear_at(own[1], x, y) / q
                 total += rules[m, 1, g] * rules[o, 1, h] * area * np.cos(k * (u * u + v * v) + phase)
@@ -157,7 +156,7 @@ def integrate_zone(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _phase_rates(quad: FloatArray, own: FloatArray, k: float) -> tuple[float, float]:
+def phase_rates(quad: FloatArray, own: FloatArray, k: float) -> tuple[float, float]:
     """Return the largest gradient of the phase, and how fast it changes, per pixel."""
     fastest, bend = 0.0, 0.0
     for c in range(4):
@@ -172,7 +171,7 @@ def _phase_rates(quad: FloatArray, own: FloatArray, k: float) -> tuple[float, fl
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _fan(poly: FloatArray, n: int, stack: FloatArray) -> int:
+def fan_quads(poly: FloatArray, n: int, stack: FloatArray) -> int:
     """Write a convex polygon as quadrilaterals, the last of them perhaps a triangle."""
     count = 0
     for k in range(1, n - 1, 2):
@@ -185,7 +184,7 @@ def _fan(poly: FloatArray, n: int, stack: FloatArray) -> int:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _point(quad: FloatArray, g: float, h: float) -> tuple[float, float, float]:
+def point_of(quad: FloatArray, g: float, h: float) -> tuple[float, float, float]:
     """Return a point of a quadrilateral and the Jacobian there, of g and h in [-1, 1]."""
     s, t = (1.0 + g) / 2, (1.0 + h) / 2
     ax, ay = quad[1, 0] - quad[0, 0], quad[1, 1] - quad[0, 1]
@@ -200,12 +199,12 @@ def _point(quad: FloatArray, g: float, h: float) -> tuple[float, float, float]:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _quarter(quad: FloatArray, out: FloatArray) -> None:
+def quarter_quad(quad: FloatArray, out: FloatArray) -> None:
     """Write the four parts of a quadrilateral, cut through the middles of its sides."""
     grid = np.empty((3, 3, 2))
     for a in range(3):
         for b in range(3):
-            grid[a, b, 0], grid[a, b, 1], _ = _point(quad, a - 1.0, b - 1.0)
+            grid[a, b, 0], grid[a, b, 1], _ = point_of(quad, a - 1.0, b - 1.0)
     for p in range(4):
         a, b = p % 2, p // 2
         for c in range(2):
@@ -214,7 +213,7 @@ def _quarter(quad: FloatArray, out: FloatArray) -> None:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _change(q: FloatArray, quad: FloatArray) -> float:
+def relative_change(q: FloatArray, quad: FloatArray) -> float:
     """Return by which share of its least value q changes over a quadrilateral."""
     low, high = np.inf, -np.inf
     for k in range(4):
@@ -224,5 +223,10 @@ def _change(q: FloatArray, quad: FloatArray) -> float:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _length(quad: FloatArray, a: int, b: int) -> float:
-    return float(np.hypot(quad[a, 0] - quad[b, 0], quad[a, 1] - quad[b, 1]))
+def longest_sides(quad: FloatArray) -> tuple[float, float]:
+    """Return the length of the longer of the first and third side, and of the second and fourth."""
+    lengths = np.empty(4)
+    for k in range(4):
+        j = (k + 1) % 4
+        lengths[k] = np.hypot(quad[k, 0] - quad[j, 0], quad[k, 1] - quad[j, 1])
+    return max(lengths[0], lengths[2]), max(lengths[1], lengths[3])

@@ -21,10 +21,10 @@ TEXELS, BLEND, ROWS = 0, 1, 2
 # Gauss-Legendre on [-1, 1]. A blend is cubic over q squared. With q changing by at most 1 / 64 it is analytic within an
 # ellipse of sum of axes 256, where a coordinate of [0, 1] is below 128: four nodes leave 128^3 256^-8 < 1e-12.
 _BLEND_NODES, _BLEND_WEIGHTS = (np.array(v) for v in np.polynomial.legendre.leggauss(4))
-_BLEND_CHANGE = 1.0 / 64.0
+BLEND_CHANGE = 1.0 / 64.0
 # half a cycle to a panel: (e A / 4 n)^(2 n) < 1e-19 with A = pi / 2 and n = 10
 _WAVE_NODES, _WAVE_WEIGHTS = (np.array(v) for v in np.polynomial.legendre.leggauss(10))
-_MOST_PANELS = 100_000
+MOST_PANELS = 100_000
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -50,7 +50,7 @@ def wrap(index: float, period: int) -> int:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _next_crossing(start: float, change: float, q0: float, dq: float, level: float) -> float:
+def next_crossing(start: float, change: float, q0: float, dq: float, level: float) -> float:
     """Return the share of an edge at which (start + s change) / (q0 + s dq) is at a level."""
     slope = change - level * dq
     return (level * q0 - start) / slope if slope != 0.0 else np.inf
@@ -91,8 +91,8 @@ def walk_texels(
         du, dv, dq = u1 - u0, v1 - v0, q1 - q0
         i, j, last_i, last_j = np.floor(u0 / q0), np.floor(v0 / q0), np.floor(u1 / q1), np.floor(v1 / q1)
         up_i, up_j = (1.0 if last_i > i else 0.0), (1.0 if last_j > j else 0.0)
-        next_u = _next_crossing(u0, du, q0, dq, i + up_i) if i != last_i else np.inf
-        next_v = _next_crossing(v0, dv, q0, dq, j + up_j) if j != last_j else np.inf
+        next_u = next_crossing(u0, du, q0, dq, i + up_i) if i != last_i else np.inf
+        next_v = next_crossing(v0, dv, q0, dq, j + up_j) if j != last_j else np.inf
         at = 0.0
         while True:
             to = max(at, min(next_u, next_v, 1.0))
@@ -122,10 +122,10 @@ def walk_texels(
                 break
             if next_u <= next_v:
                 i += 2.0 * up_i - 1.0
-                next_u = _next_crossing(u0, du, q0, dq, i + up_i) if i != last_i else np.inf
+                next_u = next_crossing(u0, du, q0, dq, i + up_i) if i != last_i else np.inf
             else:
                 j += 2.0 * up_j - 1.0
-                next_v = _next_crossing(v0, dv, q0, dq, j + up_j) if j != last_j else np.inf
+                next_v = next_crossing(v0, dv, q0, dq, j + up_j) if j != last_j else np.inf
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -137,7 +137,7 @@ def _add_blend(
     """Add the primitive of a bilinear blend along a part of an edge that stays between four texels' centres."""
     i_high = high + i_low - low
     change = abs(dq) * (to - at) / min(q0 + at * dq, q0 + to * dq)
-    panels = 1 + int(change / _BLEND_CHANGE)
+    panels = 1 + int(change / BLEND_CHANGE)
     for panel in range(panels):
         for g in range(len(_BLEND_NODES)):
             s = at + (to - at) * (panel + (1.0 + _BLEND_NODES[g]) / 2) / panels
@@ -176,7 +176,7 @@ def walk_wave(poly: FloatArray, n: int, own: FloatArray, tx: float, ty: float) -
         w0, w1 = u0 - slope * t0, u1 - slope * t1
         least = min(q0, q1)
         fastest = max(abs(u1 * q0 - u0 * q1), abs(w1 * q0 - w0 * q1)) / least**2
-        panels = 1 + int(min(max(2.0 * fastest, 8.0 * abs(q1 - q0) / least), 1.0 * _MOST_PANELS))
+        panels = 1 + int(min(max(2.0 * fastest, 8.0 * abs(q1 - q0) / least), 1.0 * MOST_PANELS))
         for panel in range(panels):
             for g in range(len(_WAVE_NODES)):
                 s = (panel + (1.0 + _WAVE_NODES[g]) / 2) / panels

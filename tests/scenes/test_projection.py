@@ -1,5 +1,7 @@
 """The camera's two directions undo each other, and its conventions are the stated ones."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -7,7 +9,7 @@ from hypothesis import strategies as st
 
 from aliasbench.scenes.errors import InputError
 from aliasbench.scenes.model import Animation, Camera
-from aliasbench.scenes.projection import view_at
+from aliasbench.scenes.projection import focus_at, lens_view, view_at
 
 STILL = Animation()
 FLAT = Camera("orthographic", height=2.0)
@@ -73,3 +75,39 @@ def test_the_target_moves_along_unless_it_has_a_velocity() -> None:
 def test_a_degenerate_camera_is_refused(camera: Camera, message: str) -> None:
     with pytest.raises(InputError, match=message):
         view_at(camera, STILL, 0, 0.0, (8, 8))
+
+
+@pytest.mark.parametrize("projection", ["orthographic", "perspective"])
+def test_lens_views_agree_with_rays_through_lens_and_focus(projection: str) -> None:
+    rng = np.random.default_rng(5)
+    for _ in range(20):
+        camera = Camera(projection, tuple(rng.normal((0, 0, 6))), tuple(rng.normal(size=3)), height=3.0, fov_y_deg=50.0)
+        view = view_at(camera, Animation(), 0, 0.0, (64, 48))
+        (a, b), focus = rng.normal(size=2), rng.uniform(0.5, 9.0)
+        through = lens_view(view, a, b, focus)
+        x, y = rng.uniform(0, 64), rng.uniform(0, 48)
+        start, along = view.ray(np.array(x), np.array(y))
+        in_focus = start + along * focus
+        np.testing.assert_allclose(through.project(in_focus), [x, y, focus], atol=1e-11)
+        lens = (start if projection == "orthographic" else view.origin) + a * view.right + b * view.up
+        for depth in rng.uniform(0.2, 20.0, 3):
+            np.testing.assert_allclose(
+                through.project(lens + (in_focus - lens) * depth / focus), [x, y, depth], atol=1e-10
+            )
+        begin, direction = through.ray(np.array(x), np.array(y))
+        np.testing.assert_allclose(begin + direction * focus, in_focus, atol=1e-11)
+        np.testing.assert_allclose(begin, lens, atol=1e-11)
+
+
+def test_centre_of_the_lens_is_the_pinhole() -> None:
+    view = view_at(DEEP, Animation(), 0, 0.0, (64, 48))
+    through = lens_view(view, 0.0, 0.0, 3.0)
+    assert all(np.array_equal(getattr(through, k), getattr(view, k)) for k in ("origin", "right", "up", "forward"))
+    assert through.shear == view.shear == (0.0, 0.0)
+
+
+def test_focus_follows_the_target_unless_it_is_given() -> None:
+    moving = Camera("orthographic", (0, 0, 5), (0, 0, 0), height=2.0, target_velocity=(0, 0, 1.0))
+    assert focus_at(moving, Animation(fps=4.0), 6, 0.0) == pytest.approx(3.5)
+    assert focus_at(replace(moving, velocity=(0, 0, 1.0)), Animation(fps=4.0), 6, 0.0) == pytest.approx(5.0)
+    assert focus_at(replace(moving, focus_distance=2.0), Animation(), 6, 0.0) == 2.0

@@ -1,5 +1,10 @@
-"""Small scenes for the references' tests, built from the plain model; and a cache of their own."""
+"""Small scenes for the references' tests, built from the plain model; and a cache of their own.
 
+The oracle, the maker of random scenes and the trials that bring them together are modules beside the tests, not tests:
+this folder is put on the path for them.
+"""
+
+import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -8,6 +13,7 @@ import pytest
 
 from aliasbench.scenes.model import Animation, Camera, Motion, Scene, Surface, Texture, Vec3, read_only
 
+sys.path.append(str(Path(__file__).parent))
 CORNERS = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))
 
 

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from aliasbench.renderers.catalog import render
-from aliasbench.scenes.errors import NotAvailableError
 from aliasbench.scenes.model import Camera, Checker, Grating, ImageTexture, Motion, ZonePlate, read_only
 from aliasbench.scenes.textures import evaluate_point
 
@@ -178,20 +177,7 @@ def test_turning_texture_is_within_its_bound(make_polygon, make_scene):
     assert np.abs(frame.pixels - mean_of_instants(scene, size, 500)).max() <= frame.uncertainty + 1e-4
 
 
-@pytest.mark.parametrize(
-    "keys",
-    [
-        "filter=box,radius=1.3",
-        "filter=box,radius=0.2",
-        "filter=tent",
-        "filter=cone",
-        "filter=gaussian",
-        "filter=gaussian,radius=inf",
-        "filter=mitchell,radius=1.5",
-        "filter=lanczos",
-    ],
-)
-def test_filtered_checker_is_within_its_bound_of_its_squares_as_polygons(make_polygon, make_scene, keys):
+def test_checker_under_a_cone_is_within_its_bound_of_its_squares_as_polygons(make_polygon, make_scene):
     camera = Camera("perspective", position=(0.2, 0.9, 2.0), target=(0, 0, 0), up=(0.3, 1, 0), fov_y_deg=40.0)
     dark, light = (0.1, 0.0, 0.0), (0.9, 0.8, 1.0)
     floor = [(-1.0, 0.0, 1.0), (1.0, 0.0, 1.0), (1.0, 0.0, -1.0), (-1.0, 0.0, -1.0)]
@@ -206,8 +192,8 @@ def test_filtered_checker_is_within_its_bound_of_its_squares_as_polygons(make_po
                 make_polygon([(x0, 0, z0), (x1, 0, z0), (x1, 0, z1), (x0, 0, z1)], light if (i + j) % 2 else dark)
             )
     size = (10, 7)
-    frame = render(textured, f"reference:{keys}", size=size)
-    truth = render(make_scene(tiles, camera=camera), f"reference:{keys}", size=size)
+    frame = render(textured, "reference:filter=cone", size=size)
+    truth = render(make_scene(tiles, camera=camera), "reference:filter=cone", size=size)
     assert truth.uncertainty_kind == "bound"
     assert frame.uncertainty_kind == "confidence"
     assert frame.uncertainty is not None
@@ -234,10 +220,3 @@ def test_what_would_take_too_many_clips_is_sampled_by_lines(make_polygon, make_s
     assert lines.uncertainty is not None
     assert lines.uncertainty < 2e-3
     assert 0.0 < np.abs(lines.pixels - exact.pixels).max() <= lines.uncertainty
-
-
-def test_holes_by_alpha_are_refused(make_polygon, make_scene):
-    texels = np.zeros((2, 2, 4), np.float32)
-    scene = make_scene([make_polygon(SQUARE, texture="i")], textures={"i": ImageTexture(read_only(texels), 0.5)})
-    with pytest.raises(NotAvailableError, match="texture 'i' cuts out parts by alpha_cutoff"):
-        render(scene, "reference:", size=(4, 4))

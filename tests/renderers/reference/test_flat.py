@@ -7,8 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from aliasbench.renderers.catalog import render
-from aliasbench.scenes.errors import InputError, NotAvailableError
-from aliasbench.scenes.model import Camera, Light, Material, Scene, Surface
+from aliasbench.scenes.model import Camera, Scene, Surface
 from aliasbench.scenes.projection import view_at
 
 ULP = 2.0**-52
@@ -157,17 +156,3 @@ def test_seed_changes_nothing(make_polygon, make_scene):
     scene = make_scene([make_polygon([(-0.5, -0.4), (0.7, 0.1), (0, 0.8)])])
     one, two = (render(scene, "reference:", size=(8, 8), seed=s).pixels for s in (0, 5))
     assert np.array_equal(one, two)
-
-
-def test_missing_features_are_named(make_polygon, make_scene):
-    triangle = make_polygon([(-0.5, -0.4), (0.7, 0.1), (0, 0.8)])
-    camera = Camera("perspective", fov_y_deg=30.0, lens_radius=0.1)
-    with pytest.raises(InputError, match="lens_radius"):
-        render(make_scene([triangle], camera=camera), "reference:", size=(4, 4))
-    glossy = Surface(triangle.vertices, triangle.triangles, material=Material("glossy"))
-    with pytest.raises(NotAvailableError, match="material glossy"):
-        render(make_scene([glossy]), "reference:", size=(4, 4))
-    light = Light(((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)), (1, 1, 1))
-    lit = Scene("t", Camera("orthographic", height=2.0), (triangle,), lights=(light,))
-    with pytest.raises(NotAvailableError, match="lights are not available"):
-        render(lit, "reference:", size=(4, 4))

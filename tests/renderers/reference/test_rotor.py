@@ -6,9 +6,11 @@ from scipy.integrate import quad
 
 from aliasbench.renderers.catalog import render
 from aliasbench.renderers.reference.faces import build_faces
-from aliasbench.renderers.reference.flat import draw_instant, draw_shutter, draw_slices, palette
+from aliasbench.renderers.reference.flat import draw_instant, palette
+from aliasbench.renderers.reference.moving import draw_panels, draw_shutter
 from aliasbench.renderers.reference.paths import scene_paths
 from aliasbench.renderers.reference.turning import find_rotor
+from aliasbench.renderers.sampling.filters import make_filter
 from aliasbench.scenes.catalog import SCENES
 from aliasbench.scenes.model import Camera, Motion, Spin
 
@@ -25,16 +27,17 @@ def closed_form(scene, size, frame=0):
     """Return the integral, having checked that it is the closed form."""
     faces, paths = build_faces(scene), scene_paths(scene)
     assert find_rotor(scene, faces, paths, size, frame, palette(scene)) is not None
-    return draw_shutter(scene, faces, paths, size, frame)
+    return draw_shutter(scene, faces, paths, size, frame, make_filter("box", 0.5))
 
 
 def is_closed_form(scene, size=(16, 16)):
     return find_rotor(scene, build_faces(scene), scene_paths(scene), size, 0, palette(scene)) is not None
 
 
-def assert_agrees_with_slices(scene, size, frame=0, slices=600):
+def assert_agrees_with_panels(scene, size, frame=0):
     integral = closed_form(scene, size, frame)
-    brute = draw_slices(scene, build_faces(scene), scene_paths(scene), size, frame, slices)[0]
+    spec = make_filter("box", 0.5)
+    brute = draw_panels(scene, build_faces(scene), scene_paths(scene), size, frame, spec, 1e-4)
     error = np.abs(integral.pixels - brute.pixels).max(axis=2)
     assert (error <= integral.bound + brute.bound).all()
     assert integral.pixels.max() - integral.pixels.min() > 0.05
@@ -56,21 +59,21 @@ def random_scene(rng, make_polygon, make_scene):
 
 
 @pytest.mark.parametrize("seed", range(24))
-def test_random_patterns_agree_with_time_slices(make_polygon, make_scene, seed):
+def test_random_patterns_agree_with_panels(make_polygon, make_scene, seed):
     rng = np.random.default_rng(seed)
     scene = random_scene(rng, make_polygon, make_scene)
     size = tuple(rng.integers(5, 20, 2).tolist())
-    assert_agrees_with_slices(scene, size, int(rng.integers(0, 40)), slices=300)
+    assert_agrees_with_panels(scene, size, int(rng.integers(0, 40)))
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_small_turns_agree_with_time_slices_to_their_square(make_polygon, make_scene, seed):
+def test_small_turns_agree_with_panels(make_polygon, make_scene, seed):
     # a slow turn moves a pixel's edges by a few pixels: 1500 middles are good to 1e-4
     rng = np.random.default_rng(100 + seed)
     motion = spinning(float(rng.uniform(0.5, 1.5)), center=(0.1, -0.2, 0.0))
     corners = rng.uniform(0.3, 0.8, 3)[:, None] * np.c_[np.cos(a := np.arange(3) * 2.1), np.sin(a)]
     shape = make_polygon(corners, motion=motion)
-    assert assert_agrees_with_slices(make_scene([shape], shutter=0.6), (12, 12), slices=1500) < 1e-4
+    assert assert_agrees_with_panels(make_scene([shape], shutter=0.6), (12, 12)) < 1e-4
 
 
 @pytest.mark.parametrize("turns", [1, 2, 100])
@@ -144,7 +147,7 @@ def test_the_hub_may_lie_on_corners_sides_and_edges(make_polygon, make_scene):
         ):
             moved = np.array(points) + center[:2]
             scene = make_scene([make_polygon(moved, motion=spinning(7.0, center=center))], shutter=0.9)
-            assert_agrees_with_slices(scene, (16, 16), slices=300)
+            assert_agrees_with_panels(scene, (16, 16))
 
 
 def test_parts_add_up_to_the_whole(make_polygon, make_scene):
@@ -172,14 +175,14 @@ def test_backdrop_and_still_neighbours(make_polygon, make_scene):
     shape = make_polygon([(0.1, 0.02), (0.5, 0.1), (0.4, 0.3)], (1, 0, 0), motion=spinning(12.0))
     wall = make_polygon([(-2, -2, -1), (2, -2, -1), (2, 2, -1), (-2, 2, -1)], (0, 0.5, 1))
     sign = make_polygon([(0.6, 0.6, 1), (0.9, 0.7, 1), (0.7, 0.9, 1)], (1, 1, 0))
-    assert_agrees_with_slices(make_scene([shape, wall, sign], shutter=0.5), (17, 16))
+    assert_agrees_with_panels(make_scene([shape, wall, sign], shutter=0.5), (17, 16))
     front = make_polygon([(-2, -2, 1), (2, -2, 1), (2, 2, 1), (-2, 2, 1)], (0, 0.5, 1))
     near = make_polygon([(0.3, 0.3, -1), (0.9, 0.7, -1), (0.7, 0.9, -1)], (1, 1, 0))
     assert not is_closed_form(make_scene([shape, front], shutter=0.5))
     assert not is_closed_form(make_scene([shape, near], shutter=0.5))
 
 
-def test_other_motions_are_left_to_slices(make_polygon, make_scene):
+def test_other_motions_are_left_to_panels(make_polygon, make_scene):
     points = [(0.1, 0.02), (0.5, 0.1), (0.4, 0.3)]
 
     def one(motion, **kwargs):
