@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 from aliasbench.bench.arguments import parse
 from aliasbench.bench.streams import discard_output, open_streams, writing_output
-from aliasbench.bench.wording import duration, printable, sentence
+from aliasbench.bench.wording import certainty, duration, printable, sentence
 from aliasbench.scenes.errors import InputError, UnsupportedScene, unknown_name
 
 if TYPE_CHECKING:
@@ -145,7 +145,8 @@ def _render(options: argparse.Namespace) -> int:
     if options.json:
         _print_json(facts)
     else:
-        _say(printable(f"{options.output}: {scene.name} by {technique.text}, {duration(frame.seconds)}"))
+        known = "" if frame.uncertainty is None else f", {certainty(frame.uncertainty, frame.uncertainty_kind)}"
+        _say(printable(f"{options.output}: {scene.name} by {technique.text}, {duration(frame.seconds)}{known}"))
     return OK
 
 

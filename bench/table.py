@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from aliasbench.bench.export import Record, Run
 from aliasbench.bench.timing import summarise
-from aliasbench.bench.wording import printable, sentence
+from aliasbench.bench.wording import certainty, printable, sentence
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -73,10 +73,12 @@ def legend_lines(run: Run, width: int) -> list[str]:
         scores = [s for r in records for s in r["metrics"].values()]
         hidden = sum(_is_hidden(s) for s in scores)
         known = sum(s["value"] is not None for s in scores)
-        uncertainty = max((r["uncertainty"] or 0.0 for r in records), default=0.0)
+        uncertainty, kind = max(
+            ((r["uncertainty"] or 0.0, r["uncertainty_kind"] or "") for r in records), default=(0.0, "")
+        )
         if hidden > known and uncertainty > NEGLIGIBLE:
             lines.append(
-                f"{printable(scene)} {size[0]} x {size[1]}: its reference is uncertain by {uncertainty:.2g}, which"
+                f"{printable(scene)} {size[0]} x {size[1]}: its reference is {certainty(uncertainty, kind)}, which"
                 f" hides {hidden} of {hidden + known} scores"
             )
     return lines

@@ -47,3 +47,8 @@ def duration(seconds: float) -> str:
         return f"{seconds:.3g} s"
     minutes = round(seconds / 60)
     return f"{minutes} min" if minutes < 120 else f"{round(seconds / 3600)} h"
+
+
+def certainty(uncertainty: float, kind: str | None) -> str:
+    """Return how well a reference is known: certified to a bound, or by a 99 % confidence interval of its samples."""
+    return f"{'99 % confident' if kind == 'confidence' else 'certified'} to {uncertainty:.2g}"

@@ -18,6 +18,7 @@ import jinja2
 from markupsafe import Markup, escape
 from plotly.offline import get_plotlyjs
 
+from aliasbench.bench.wording import certainty
 from aliasbench.reports import charts, tables
 from aliasbench.reports.figures import HEAT_HIGH, HEAT_LOW, heat_palette
 from aliasbench.reports.gallery import Gallery, make_galleries
@@ -42,13 +43,15 @@ class Trouble:
 class SceneSection:
     """One scene at one size: its pictures, its chart (None where nothing can be drawn) and its table.
 
-    `link` is what leads here: the title, with the size where the scene has several.
+    `link` is what leads here: the title, with the size where the scene has several. `truth` says how well its
+    references are known, empty where there are none.
     """
 
     anchor: str
     title: str
     link: str
     size: str
+    truth: str
     gallery: Gallery
     figure: dict[str, Any] | None
     findings: Sequence[str]
@@ -161,6 +164,7 @@ def _scene_section(
         title=group[0].scene,
         link=link,
         size=tables.size_text(group[0].size),
+        truth=_truth(group),
         gallery=gallery,
         figure=charts.speed_chart(points, runs) if points else None,
         findings=charts.findings(points),
@@ -168,6 +172,16 @@ def _scene_section(
         absent=[_absence(r) for r in group if id(r) not in drawn],
         table=tables.scene_table(group, runs),
     )
+
+
+def _truth(group: Sequence[Record]) -> str:
+    """Return how well the references of a scene's records are known, worst first."""
+    worst: dict[str | None, float] = {}
+    for record in group:
+        if record.uncertainty is not None:
+            worst[record.uncertainty_kind] = max(record.uncertainty, worst.get(record.uncertainty_kind, 0.0))
+    ordered = sorted(worst.items(), key=lambda item: -item[1])
+    return "; ".join(certainty(uncertainty, kind) for kind, uncertainty in ordered)
 
 
 def _troubles(records: Sequence[Record]) -> list[Trouble]:

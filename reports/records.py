@@ -48,7 +48,7 @@ class Score:
 class Record:
     """One case of one run; `run` is the label of the run, `folder` where its image files are.
 
-    `timing` is None where nothing was timed; times are in seconds.
+    `timing` is None where nothing was timed; times are in seconds. `uncertainty` is the reference's, None if unknown.
     """
 
     run: str
@@ -65,6 +65,8 @@ class Record:
     samples: int | None
     images: Mapping[str, str] = field(default_factory=dict)
     metrics: Mapping[str, Score] = field(default_factory=dict)
+    uncertainty: float | None = None
+    uncertainty_kind: str | None = None
 
     @property
     def renderer(self) -> str:
@@ -156,6 +158,8 @@ def _read_record(r: Mapping[str, Any], folder: Path, label: str) -> Record:
         samples=None if r.get("samples") is None else int(r["samples"]),
         images={str(k): str(v) for k, v in (r.get("images") or {}).items() if v},
         metrics={str(name): _read_score(score) for name, score in (r.get("metrics") or {}).items()},
+        uncertainty=_finite(r.get("uncertainty")),
+        uncertainty_kind=r.get("uncertainty_kind"),
     )
 
 

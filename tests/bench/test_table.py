@@ -107,6 +107,6 @@ def test_a_reference_that_hides_most_scores_is_named_with_its_uncertainty(
     known = {"value": 0.5, "status": "ok", "extras": {}}
     metrics = {str(i): hidden if i < hidden_count else known for i in range(5)}
     lines = legend_lines({**run, "records": [record("a", "x", metrics=metrics, uncertainty=uncertainty)]}, 140)
-    sentence = "a 8 x 8: its reference is uncertain by 0.0098, which hides 3 of 5 scores"
+    sentence = "a 8 x 8: its reference is certified to 0.0098, which hides 3 of 5 scores"
     assert (sentence in lines) == bool(said)
     assert len(lines) == 1 + bool(said)

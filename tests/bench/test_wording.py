@@ -2,7 +2,7 @@
 
 import pytest
 
-from aliasbench.bench.wording import SHOWN, duration, printable, sentence, shortened, shown
+from aliasbench.bench.wording import SHOWN, certainty, duration, printable, sentence, shortened, shown
 
 
 def test_only_what_does_not_print_is_written_out() -> None:
@@ -53,3 +53,8 @@ def test_a_sentence_is_one_line_without_endless_words_and_keeps_paths() -> None:
 )
 def test_a_duration_has_the_unit_that_suits_it(seconds: float, text: str) -> None:
     assert duration(seconds) == text
+
+
+def test_a_bound_and_a_confidence_interval_read_differently() -> None:
+    assert certainty(2.31e-9, "bound") == "certified to 2.3e-09"
+    assert certainty(7e-4, "confidence") == "99 % confident to 0.0007"

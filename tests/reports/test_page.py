@@ -90,6 +90,19 @@ def test_links_to_scenes_say_the_size_where_it_tells_them_apart(
     assert links == ["a 32 × 32", "a 64 × 64", "b"]
 
 
+def test_how_well_a_reference_is_known_stands_beside_its_scene(
+    fabricate: Fabricate, make_record: MakeRecord, tmp_path: Path
+) -> None:
+    records = [
+        make_record("a", "raster:", uncertainty=2e-6, uncertainty_kind="bound"),
+        make_record("a", "raytrace:", uncertainty=7e-4, uncertainty_kind="confidence"),
+        make_record("b", "raster:", uncertainty=None),
+    ]
+    text = write_report([fabricate(records, "r")], tmp_path).read_text(encoding="utf-8")
+    assert text.count("reference 99 % confident to 0.0007; certified to 2e-06") == 1
+    assert text.count("· reference") == 1
+
+
 def test_points_that_a_logarithmic_axis_cannot_show_are_named(typical: Path, tmp_path: Path) -> None:
     page = report([typical], tmp_path)
     assert re.search(r"no error that could be measured.*1 sample \(equal to the reference, 10\.1 ms\)", page.text)
