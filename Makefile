@@ -9,7 +9,7 @@ run: setup
 
 test:
 	@sh .ci/setup.sh browser
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n auto --dist loadfile
 
 setup:
 	@sh .ci/setup.sh

@@ -12,12 +12,14 @@ from numba import njit
 from numpy.typing import NDArray
 
 from aliasbench.renderers.reference.coverage import row_extent
+from aliasbench.renderers.reference.placement import Movers, place_faces, room_for
 from aliasbench.renderers.reference.slabs import TIE
 from aliasbench.scenes.model import FloatArray
 
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 
+_LIKELY = 0.6  # of the bound on an edge's speed across itself, where it need not be certain
 _FOLLOWED_PX = 8.0  # way within a slice up to which the margin round the picture lets edges be followed
 
 
@@ -34,6 +36,8 @@ class Slices(NamedTuple):
         The pieces of slice i: instants[i] to instants[i + 1].
     loose, loose_speeds, loose_starts : (k,) int64, (k,) float64 and (s + 1,) int64
         `Pieces.loose` of slice i: loose[loose_starts[i] : loose_starts[i + 1]]; and their speeds.
+    across : (k,) float64
+        How fast the edge that starts at a corner moves across itself, at most, as `reach`.
     near, low, high, steep, turns : (m,) float64
         Of every piece: how far it may move, and least and greatest y, within the slice; size of its nearness'
         gradient; and a bound on its angular speed against the camera, radians per frame interval.
@@ -61,6 +65,7 @@ class Slices(NamedTuple):
     loose: IntArray
     loose_speeds: FloatArray
     loose_starts: IntArray
+    across: FloatArray
     near: FloatArray
     low: FloatArray
     high: FloatArray
@@ -81,7 +86,8 @@ class Marks(NamedTuple):
     edges : (w,) int64
         How many outlines come near; a corner counts for two more.
     speed : (w,) float64
-        Bounds on the speed of what comes near, pixels per frame interval.
+        Of what comes near, at most, pixels per frame interval: the geometric mean of the speeds along and across it,
+        whose square, times that of a time, is about what a corner covers in it.
     active, restless : (w,) bool
         Whether the pixel may change, and whether planes in it may change their order.
     left, right : (pieces,) float64
@@ -112,6 +118,45 @@ def describe_pieces(slices: Slices) -> None:
             gx, gy = p[0] * scale, p[1] * scale
             g1 = p[2] + p[0] * cx + p[1] * cy if slices.perspective else 1.0
             slices.steep[i] = np.sqrt(gx * gx + gy * gy + g1 * g1)
+
+
+def measure_across(slices: Slices, movers: Movers) -> None:
+    """Fill `across` from where edges are as their slice begins and ends.
+
+    With a speed v and an acceleration a the way from the middle is v t + a t^2 / 2: the longer of both ways over half
+    the slice is at least half of the largest speed times that, and no way is longer in between.
+    """
+    widest = int(np.diff(slices.instants).max(initial=0))
+    room = room_for(widest, movers.widest)
+    slices.across[:] = 0.0
+    for s in range(len(slices.begins)):
+        first, last = slices.instants[s], slices.instants[s + 1]
+        if first == last:
+            continue
+        corners = slice(slices.starts[first], slices.starts[last])
+        starts = slices.starts[first : last + 1] - slices.starts[first]
+        following = np.arange(1, starts[-1] + 1)
+        following[starts[1:] - 1] = starts[:-1]
+        points = slices.points[corners]
+        along = points[following] - points
+        length = np.hypot(along[:, 0], along[:, 1])
+        for end in (0.0, 1.0):
+            m = place_faces(
+                movers, slices.faces[first:last], last - first, slices.begins[s] + end * slices.lengths[s], room
+            )
+            if m != last - first or not np.array_equal(room.starts[: m + 1], starts):
+                slices.across[corners] = np.inf
+                break
+            way = room.points[: starts[-1]] - points
+            far = np.abs(along[:, 0] * way[:, 1] - along[:, 1] * way[:, 0])
+            # of the edge's other end
+            on = way[following]
+            far = np.maximum(far, np.abs(along[:, 0] * on[:, 1] - along[:, 1] * on[:, 0]))
+            with np.errstate(divide="ignore", invalid="ignore"):
+                speed = 4.0 * far / (length * slices.lengths[s])
+            speed[~(speed < np.inf)] = np.inf
+            slices.across[corners] = np.maximum(slices.across[corners], speed)
+    np.minimum(slices.across, slices.reach, out=slices.across)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
@@ -186,13 +231,17 @@ def _mark_edges(slices: Slices, i: int, length: float, row: int, width: int, mar
         ta, tb = within(y0, y1, row - near, row + 1 + near)
         if ta > tb:
             continue
+        dx, dy = x1 - x0, y1 - y0
+        # a pixel's half diagonal across the edge, and how far the edge gets across itself
+        broad = (abs(dx) + abs(dy)) / 2 + (slices.across[k] * length / 2 + 1e-9) * np.sqrt(dx * dx + dy * dy)
+        speed = np.sqrt(speed * slices.across[k] * _LIKELY)
         xa, xb = x0 + ta * (x1 - x0), x0 + tb * (x1 - x0)
         left = max(0, int(np.floor(max(min(xa, xb) - near, -1.0))))
         right = min(width - 1, int(np.floor(min(max(xa, xb) + near, float(width)))))
         for column in range(left, right + 1):
             sa, sb = within(x0, x1, column - near, column + 1 + near)
             sa, sb = max(sa, ta), min(sb, tb)
-            if sa > sb:
+            if sa > sb or abs(dx * (row + 0.5 - y0) - dy * (column + 0.5 - x0)) > broad:
                 continue
             marks.edges[column] += 3 if sa <= 0.0 or sb >= 1.0 else 1
             if speed > 0.0:

@@ -3,8 +3,8 @@
 At an instant the box filter is exact (`textured`), and every separable filter is as good as that (`smoothed`); the
 cone, and what would take too much work, adds an unbiased estimate of a small rest (`weighted`). An open shutter
 averages exact instants from strata of the shutter, two to a stratum as mirror images, so that what is linear in time
-cancels; replicates share the finest strata, which makes their spread too large rather than too small. What would take
-too many clips is integrated exactly along lines (`scanlines`) and sampled across them.
+cancels; replicates share the finest strata, which makes their spread too large rather than too small. Under wide
+filters it averages points (`dotted`). Zone plates too fine for quadrature are integrated along lines (`scanlines`).
 
 The bound of a value is Student's t times its standard error. "All pixels at once" is taken literally: the quantile is
 Bonferroni's for every channel of every pixel, 1 - 0.01 / (2 m). Pooling variances over pixels would be smaller and
@@ -12,12 +12,14 @@ wrong, pixels differ by orders of magnitude.
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
 from aliasbench.renderers.reference.cache import Stored
+from aliasbench.renderers.reference.dotted import affordable_instants, draw_dotted, lattice
 from aliasbench.renderers.reference.faces import Faces
 from aliasbench.renderers.reference.filtered import is_pixel_box, wide_view
 from aliasbench.renderers.reference.flat import over_bands, palette, scene_extent
@@ -35,13 +37,13 @@ from aliasbench.renderers.sampling.hashing import combine, permute, unit
 from aliasbench.scenes.model import FloatArray, ImageTexture, Scene
 from aliasbench.scenes.projection import view_at
 
-REPLICATES = 16
+REPLICATES = 12  # Student's factor against the finer strata of fewer
 _LINES = 64  # of a row in a replicate, at 256 x 256; the work is the same at other sizes
 _TIMES = 32
 _CONFIDENCE = 0.99
-_MOST_STRATA = 64  # of the shutter, in a replicate
+_MOST_STRATA = 96  # of the shutter, in a replicate
 # Prices in nanoseconds, measured; they choose the number of strata, so they are constants and not clocks.
-_BUDGET, _PIXEL_COST, _CROSSING_COST, _TILE_COST, _PIECE_COST = 3e10, 1500.0, 40.0, 100.0, 2e5
+_BUDGET, _PIXEL_COST, _CROSSING_COST, _TILE_COST, _PIECE_COST = 3.6e10, 1000.0, 40.0, 100.0, 1e6
 _CELL_WORK, _MOST_CELLS = 2**24, 21  # cells under all filters of a replicate; to a pixel along one axis
 _FLOOR = 1e-9  # for the rounding of what is averaged
 
@@ -64,7 +66,7 @@ def converge(
     """
     table = texture_table(scene, linear=linear)
     shutter = scene.animation.shutter
-    cells = None if is_pixel_box(spec) else build_cells(spec, _cells_each(spec, size, spread=spread))
+    cells = None if is_pixel_box(spec) else build_cells(spec, _cells_each(spec, size))
 
     def snapshot(fraction: float) -> "_Snapshot":
         return _Snapshot(scene, faces, paths, size, frame, fraction, table, cells)
@@ -73,6 +75,15 @@ def converge(
         slide = _slide(scene, faces, paths, size, frame, table, spec)
         if slide is not None:
             return slide
+        if cells is not None:
+            points = lattice(spec)
+            count = affordable_instants(points, size, len(faces.owners), _BUDGET / REPLICATES)
+
+            def dots(replicate: int) -> FloatArray:
+                seed = int(combine(combine(0x7E57, replicate), frame))
+                return draw_dotted(scene, faces, paths, size, frame, table, points, count, seed)
+
+            return _average(dots, size, count * points.each**2, 0.0)
     elif cells is not None and spec.kind.separable:
         view = wide_view(view_at(scene.camera, scene.animation, frame, shutter / 2, size), spec)
         smooth = draw_smoothed(instant_of(scene, faces, paths, view, frame, shutter / 2, table), spec)
@@ -86,6 +97,7 @@ def converge(
             return Stored(middle.base, middle.bound, 0)
         return _average(lambda replicate: middle.picture(replicate), size, 1, middle.bound or 0.0)
     strata = int(np.clip(_BUDGET / (2 * REPLICATES * _price(middle.instant)), 1, _MOST_STRATA))
+    bounds = [middle.bound]
 
     def one(replicate: int) -> FloatArray:
         total = np.zeros((size[1], size[0], 3))
@@ -94,10 +106,17 @@ def converge(
             u = (permute(replicate, REPLICATES, key) + unit(combine(key, 1), replicate)) / (2 * REPLICATES)
             for half, place in enumerate((u, 1.0 - u)):
                 seed = (replicate * strata + k) * 2 + half
-                total += snapshot(shutter * (k + place) / strata).picture(seed)
+                shown = snapshot(shutter * (k + place) / strata)
+                bounds.append(shown.bound)
+                total += shown.picture(seed)
         return total / (2 * strata)
 
-    return _average(one, size, 2 * strata, middle.bound or 0.0)
+    average = _average(one, size, 2 * strata, 0.0)
+    known = [bound for bound in bounds if bound is not None]
+    if len(known) < len(bounds):
+        # some instants are too fine to be drawn exactly
+        return _by_lines(scene, faces, paths, size, frame, table, spread=spread)
+    return replace(average, uncertainty=average.uncertainty + sum(known) / len(known))
 
 
 def _slide(
@@ -142,9 +161,9 @@ def _price(instant: Instant) -> float:
     )
 
 
-def _cells_each(spec: FilterSpec, size: tuple[int, int], *, spread: bool) -> int:
+def _cells_each(spec: FilterSpec, size: tuple[int, int]) -> int:
     """Return how many cells to a pixel pay: the error falls with their number, the work is one term for each."""
-    work = _CELL_WORK / (16 if spread else 1) / (size[0] * size[1])
+    work = _CELL_WORK / (size[0] * size[1])
     each = int(min(np.sqrt(work) / max(1.0, 2 * spec.support), _MOST_CELLS))
     return max(3, each - 1 + each % 2)
 
@@ -172,7 +191,7 @@ class _Snapshot:
         at = self.instant
         return self.base + sample_rest(
             self.cells, at.pieces, at.surfaces, at.colors, self.means, at.view.perspective, at.extent, self.size,
-            seed, self.frame,
+            seed, self.frame, known=self.bound is not None,
         )  # fmt: skip
 
 

@@ -128,7 +128,8 @@ def _expand_surface(surface: Surface, plain: Surface, lattice: Lattice, most: in
             out.append(_assemble(plain, _corners(faces, frame, lattice), parts, lattice))
     if whole:
         fans = [(loop[0], loop[i], loop[i + 1]) for loop in whole for i in range(1, len(loop) - 1)]
-        out.insert(0, replace(plain, triangles=read_only(np.array(fans, np.int32))))
+        # these triangles, not the outline of a polygon that has others
+        out.insert(0, replace(plain, triangles=read_only(np.array(fans, np.int32)), is_polygon=False))
     return out
 
 

@@ -17,7 +17,7 @@ from aliasbench.scenes.model import FloatArray, Scene
 from aliasbench.scenes.projection import View, view_at
 
 ROUNDING = 1e-12  # what a pixel of an exact picture may be off, relative to the largest colour
-_BAND = 16
+ROWS = 16  # of a band
 
 Answer = TypeVar("Answer")
 
@@ -32,7 +32,7 @@ class Integral:
 
 def over_bands(draw: Callable[[NDArray[np.int64]], Answer], height: int) -> list[Answer]:
     """Call `draw` for bands of rows, (first, last + 1), on all cores; the bands do not depend on their number."""
-    bands = [np.array([r, min(r + _BAND, height)], np.int64) for r in range(0, height, _BAND)]
+    bands = [np.array([r, min(r + ROWS, height)], np.int64) for r in range(0, height, ROWS)]
     # below a few bands starting threads costs more than they gain
     threads = min(
         len(bands) // 4, len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -5,7 +5,8 @@ change within a slice (`activity`, certain) counts as it is; any other is integr
 (`panels`), every instant of which is exact. The work is that of edges meeting pixels, whatever the motion. How much of
 it may be done is fixed beforehand, by count; where that is too little the bound says so.
 
-What turns as one flat pattern has a closed form under the box (`rotor`).
+What turns as one flat pattern has a closed form under the box (`rotor`), and a closed mean at every point under any
+product filter (`whirl`).
 """
 
 from dataclasses import dataclass, replace
@@ -13,15 +14,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from aliasbench.renderers.reference.activity import Slices, describe_pieces
-from aliasbench.renderers.reference.bands import Effort, count_contacts, integrate_band
+from aliasbench.renderers.reference.activity import Slices, describe_pieces, measure_across
+from aliasbench.renderers.reference.bands import Effort, integrate_row, scan_row
 from aliasbench.renderers.reference.cellvalues import shades_of
 from aliasbench.renderers.reference.faces import Faces
 from aliasbench.renderers.reference.filtered import draw_filtered, is_pixel_box, rounding_bound, wide_view
 from aliasbench.renderers.reference.flat import (
     ROUNDING,
     Integral,
-    draw_instant,
     over_bands,
     palette,
     scene_extent,
@@ -29,9 +29,10 @@ from aliasbench.renderers.reference.flat import (
 from aliasbench.renderers.reference.masses import QUADRATURE
 from aliasbench.renderers.reference.paths import Paths
 from aliasbench.renderers.reference.pieces import Pieces, join_pieces, pieces_at
-from aliasbench.renderers.reference.placement import movers_of
+from aliasbench.renderers.reference.placement import Movers, movers_of
 from aliasbench.renderers.reference.rotor import draw_rotor
 from aliasbench.renderers.reference.turning import find_rotor, still_faces
+from aliasbench.renderers.reference.whirl import WIDEST, draw_whirl
 from aliasbench.renderers.sampling.filters import FilterSpec
 from aliasbench.scenes.model import FloatArray, Scene
 from aliasbench.scenes.projection import View, view_at
@@ -40,9 +41,11 @@ TARGET = 1e-5  # the bound aimed at over an open shutter
 _SHARE = 0.7  # of it, for the panels of one cell: the rest is rounding and what is counted beforehand
 _FIRST, _MOST_SLICES, _DEEPEST = 16, 1024, 24
 _WAY_PX = 1.0  # that outlines may move within a slice
+_WAYS = np.array([1.0, 2.0, 4.0, 8.0, 16.0, 64.0, 1e3])  # that a pixel's slices are joined for, in pixels
+_PLAIN = 0.5  # share of the instants that may be spent before it is known where they are needed
 _SECTION = 256  # rows whose patches are held at a time
 # Prices in nanoseconds, measured; they set how many instants are looked at, so they are constants and not clocks.
-_LOOK_COST, _MASS_COST, _BUDGET = 2000.0, 150.0, 24e9
+_LOOK_COST, _MASS_COST, _BUDGET = 2000.0, 150.0, 20e9
 
 
 def draw_shutter(
@@ -56,23 +59,27 @@ def draw_shutter(
     InputError
         For a filter that reaches too far, see `filtered.wide_view`.
     """
-    box = is_pixel_box(spec)
     if scene.is_static or scene.animation.shutter <= 0.0:
         return draw_filtered(scene, faces, paths, size, frame, 0.0, spec)
-    if box:
-        turning = _draw_turning(scene, faces, paths, size, frame)
-        if turning is not None:
-            return turning
-    return draw_panels(scene, faces, paths, size, frame, spec, target)
+    turning = _draw_turning(scene, faces, paths, size, frame, spec, target)
+    return draw_panels(scene, faces, paths, size, frame, spec, target) if turning is None else turning
 
 
-def _draw_turning(scene: Scene, faces: Faces, paths: Paths, size: tuple[int, int], frame: int) -> Integral | None:
-    """Return the closed form of a turning pattern, None if the scene is none."""
+def _draw_turning(
+    scene: Scene, faces: Faces, paths: Paths, size: tuple[int, int], frame: int, spec: FilterSpec, target: float
+) -> Integral | None:
+    """Return the picture of a turning pattern, closed under the box, else from its closed mean; None if it is none."""
+    box = is_pixel_box(spec)
+    if not box and (not spec.kind.separable or spec.margin > WIDEST):
+        return None
     colors = palette(scene)
     rotor = find_rotor(scene, faces, paths, size, frame, colors)
     if rotor is None:
         return None
-    base = draw_instant(scene, still_faces(faces, paths), paths, size, frame, 0.0)
+    base = draw_filtered(scene, still_faces(faces, paths), paths, size, frame, 0.0, spec)
+    if not box:
+        whirl = draw_whirl(rotor, size, spec, target * _SHARE)
+        return Integral(base.pixels + whirl.pixels[:, :, rotor.channels], base.bound + whirl.bound)
     parts = over_bands(lambda rows: draw_rotor(rotor, size, (int(rows[0]), int(rows[1]))), size[1])
     turned = np.concatenate([p for p, _ in parts])[:, :, rotor.channels]
     return Integral(base.pixels + turned, base.bound + np.concatenate([b for _, b in parts]))
@@ -88,20 +95,26 @@ def draw_panels(
     view = view_at(scene.camera, scene.animation, frame, 0.0, size)
     wide = view if box else wide_view(view, spec)
     shades, blur = shades_of(colors, None if box else spec)
-    slices = _slices(scene, faces, paths, size, wide, frame, colors)
     movers = movers_of(faces, paths, wide, frame)
+    slices = _slices(scene, faces, paths, size, wide, frame, colors, movers)
     span = float((colors.max(axis=0) - colors.min(axis=0)).max())
-    counts = over_bands(lambda rows: count_contacts(slices, rows, wide.width), wide.height)
-    cells, contacts = (sum(c[k] for c in counts) for k in (0, 1))
+    joined = np.sum(over_bands(lambda rows: _count(slices, rows, wide.width), wide.height), axis=0)
     block = min(2 * shades.margin + 1, width) * min(2 * shades.margin + 1, height)
     looks = budget / (_LOOK_COST + (0.0 if box else _MASS_COST * block))
     # every contact takes four looks or five; what is left is for where they do not do
+    stage = min(int((5.0 * joined[:-2] > _PLAIN * looks).sum()), len(_WAYS) - 1)
+    contacts, cells = float(joined[stage]), float(joined[-2])
     spare = max(0.0, looks - 5.0 * contacts)
     most = int(np.clip(4e6 / (15 * block), 64, 4096))
     reach = float(shades.peaks.sum() / shades.peaks.max())
+    aim, shutter = target * _SHARE / reach, scene.animation.shutter
+    # what `panels` adds for corners asks for this many instants, if nothing else is off
+    dense = 1.5 * float(np.sqrt(span * shades.peaks.max() / (24.0 * 0.6 * aim * shutter)))
+    dense = min(dense, 0.6 * spare / max(float(joined[-1]), 1e-300))
+    spare = max(0.0, spare - dense * float(joined[-1]))
     effort = Effort(
-        span, scene.animation.shutter, target * _SHARE / reach, 0.5 * spare / max(cells, 1),
-        5.0 + 0.5 * spare / max(contacts, 1), most,
+        span, shutter, aim, 0.3 * spare / max(cells, 1.0), 5.0 + 0.4 * spare / max(contacts, 1.0), dense,
+        0.3 * spare / wide.height, most,
     )  # fmt: skip
     pixels, bound = np.zeros((height, width, 3)), np.zeros((height, width))
     margin = shades.margin
@@ -109,7 +122,11 @@ def draw_panels(
     def draw(rows: NDArray[np.int64]) -> tuple[int, FloatArray, FloatArray]:
         top, bottom = max(0, int(rows[0]) - 2 * margin), min(height, int(rows[1]))
         patch, slack = np.zeros((max(0, bottom - top), width, 3)), np.zeros((max(0, bottom - top), width))
-        integrate_band(slices, movers, shades, blur, effort, rows, width, height, top, patch, slack)
+        for row in range(rows[0], rows[1]):
+            records = scan_row(slices, row, wide.width, _WAYS, np.zeros(len(_WAYS) + 2), stage)
+            integrate_row(
+                records, movers, slices.extent, shades, blur, effort, row, width, height, top, patch, slack
+            )  # fmt: skip
         return top, patch, slack
 
     for section in range(0, wide.height, _SECTION):
@@ -129,6 +146,14 @@ def draw_panels(
     return Integral(pixels, np.minimum(bound, span * max(1.0, spec.gain)) + rounding)
 
 
+def _count(slices: Slices, rows: NDArray[np.int64], width: int) -> FloatArray:
+    """Return the number of contacts of a band's pixels, joined for each of `_WAYS`, and the rest of `scan_row`."""
+    counts = np.zeros(len(_WAYS) + 2)
+    for row in range(rows[0], rows[1]):
+        scan_row(slices, row, width, _WAYS, counts, -1)
+    return counts
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class _Slice:
     begin: float
@@ -137,12 +162,14 @@ class _Slice:
 
 
 def _slices(
-    scene: Scene, faces: Faces, paths: Paths, size: tuple[int, int], wide: View, frame: int, colors: FloatArray
-) -> Slices:
+    scene: Scene, faces: Faces, paths: Paths, size: tuple[int, int], wide: View, frame: int, colors: FloatArray,
+    movers: Movers,
+) -> Slices:  # fmt: skip
     """Return slices of the shutter, short where things move fast or come close to the camera."""
     shutter = scene.animation.shutter
     contrasts = np.array([np.abs(colors - c).max() for c in colors[:-1]])
-    most = int(np.clip(4e6 / max(len(faces.corners), 1), 4 * _FIRST, _MOST_SLICES))
+    moving = sum(not m.is_static for m in paths.motions)
+    most = int(np.clip(min(4e6 / max(len(faces.corners), 1), 4e4 / max(moving, 1)), 4 * _FIRST, _MOST_SLICES))
 
     def look(begin: float, length: float) -> _Slice:
         middle = begin + length / 2
@@ -164,7 +191,7 @@ def _slices(
         todo = [look(s.begin + k * s.length / 2, s.length / 2) for s in split for k in (0, 1)]
         if not todo:
             break
-    return _join(scene, paths, wide, frame, sorted(done + todo, key=lambda s: s.begin), contrasts)
+    return _join(scene, paths, wide, frame, sorted(done + todo, key=lambda s: s.begin), contrasts, movers)
 
 
 def _is_long(one: _Slice, faces: Faces, contrasts: FloatArray, *, certain: bool) -> bool:
@@ -177,7 +204,9 @@ def _is_long(one: _Slice, faces: Faces, contrasts: FloatArray, *, certain: bool)
     return bool((p.reach[moves] * one.length >= most).any())
 
 
-def _join(scene: Scene, paths: Paths, view: View, frame: int, parts: list[_Slice], contrasts: FloatArray) -> Slices:
+def _join(
+    scene: Scene, paths: Paths, view: View, frame: int, parts: list[_Slice], contrasts: FloatArray, movers: Movers
+) -> Slices:
     pieces = join_pieces([s.pieces for s in parts])
     distinct = {m: k for k, m in enumerate(dict.fromkeys(m for m in paths.motions if not m.is_static))}
     kinds = np.array([-1 if m.is_static else distinct[m] for m in paths.motions], np.int64)
@@ -190,10 +219,11 @@ def _join(scene: Scene, paths: Paths, view: View, frame: int, parts: list[_Slice
         np.array([s.begin for s in parts]), np.array([s.length for s in parts]), pieces.points, pieces.reach,
         pieces.outlined, pieces.starts, pieces.planes, pieces.owners, pieces.faces, pieces.instants, pieces.loose,
         pieces.loose_speeds, np.cumsum([0] + [len(s.pieces.loose) for s in parts]).astype(np.int64),
-        np.empty(size), np.empty(size), np.empty(size), np.empty(size), turns, kinds, contrasts, camera,
-        view.perspective, scene_extent(scene),
+        np.empty(len(pieces.points)), np.empty(size), np.empty(size), np.empty(size), np.empty(size), turns, kinds,
+        contrasts, camera, view.perspective, scene_extent(scene),
     )  # fmt: skip
     describe_pieces(slices)
+    measure_across(slices, movers)
     return slices
 
 

@@ -6,8 +6,9 @@ with half the step differs by (d - e) / 12. A kink or a jump of the first deriva
 jump of the value at most twice: a panel's bound is (abs d + abs e) / 6, where two kinks cannot cancel.
 
 What no instant sees would be missed: a corner that enters the cell and leaves it between two instants, g apart. At
-speed V it gets as far as V g / 2 and covers less than (V g)^2 / 12 on average; that much is added wherever outlines
-might do it (more than one straight outline near the cell). Planes that may change their order are looked at
+speed V it gets as far as V g / 2 and covers less than (V g)^2 / 6 on average, or V W g^2 / 6 where its sides move at W
+across themselves; that much is added for one gap of four wherever outlines might do it (more than one straight outline
+near the cell). Planes that may change their order are looked at
 beforehand: slices are halved until their distance at the cell's corners is seen to keep its sign or to change it.
 """
 
@@ -63,14 +64,16 @@ class Panels(NamedTuple):
 
 @njit(cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
 def integrate_cell(
-    movers: Movers, contacts: Contacts, n: int, block: Block, shades: Shades, blur: Blur | None, extent: float,
-    span: float, shutter: float, target: float, allowed: int, panels: Panels, room: Room, runs: FloatArray,
-    sides: IntArray, total: FloatArray, bound: FloatArray,
+    movers: Movers, contacts: Contacts, begin_at: int, end_at: int, block: Block, shades: Shades, blur: Blur | None,
+    extent: float, span: float, shutter: float, target: float, allowed: int, panels: Panels, room: Room,
+    runs: FloatArray, sides: IntArray, total: FloatArray, bound: FloatArray,
 ) -> tuple[int, FloatArray, IntArray]:  # fmt: skip
-    """Add a cell's integral over n contacts to `total` (rows columns 3,), and its bounds to `bound` (rows, columns).
+    """Add a cell's integral over some contacts to `total` (rows columns 3,), and its bounds to `bound` (rows columns,).
 
     Parameters
     ----------
+    begin_at, end_at : int
+        The first contact and the last + 1.
     span : float
         The largest difference of two colours.
     shutter : float
@@ -86,94 +89,99 @@ def integrate_cell(
         How many instants were looked at; then the room for borders.
     """
     size = block.rows * block.columns * 3
-    most = len(panels.bounds)
+    spans, values, bounds, of = panels.spans, panels.values, panels.bounds, panels.contacts
+    begins, lengths, speeds, restless = contacts.begins, contacts.lengths, contacts.speeds, contacts.restless
+    starts, listed = contacts.starts, contacts.faces
+    most = len(bounds)
     peak = 0.0
     for i in range(block.rows):
         for j in range(block.columns):
             peak = max(peak, shades.peaks[block.row - block.top - i, block.column - block.left - j])
     count, looks = 0, 0
-    unresolved = 0.0
-    for k in range(n):
-        faces, amount = contacts.faces[contacts.starts[k] :], contacts.starts[k + 1] - contacts.starts[k]
+    unresolved, over = 0.0, 0.0
+    for k in range(begin_at, end_at):
+        faces, amount = listed[starts[k] :], starts[k + 1] - starts[k]
         before = count
-        if contacts.restless[k]:
-            count, more, seen = _resolve(
-                movers, faces, amount, contacts.begins[k], contacts.lengths[k], block, extent, room,
-                min(most - n + k, count + max(4, allowed // 8)), panels.spans, count,
+        if restless[k]:
+            added, more, seen = _resolve(
+                movers, faces, amount, begins[k], lengths[k], block, extent, room,
+                min(most - end_at + k - count, max(4, allowed // 8)), spans[count:],
             )  # fmt: skip
+            count += added
             unresolved += more * span / shutter
             looks += seen
         else:
-            panels.spans[count, 0], panels.spans[count, 1] = contacts.begins[k], contacts.lengths[k]
+            spans[count, 0], spans[count, 1] = begins[k], lengths[k]
             count += 1
         for p in range(before, count):
-            panels.contacts[p] = k
-            begin, length = panels.spans[p]
+            of[p] = k
+            begin, length = spans[p, 0], spans[p, 1]
             first = 0
-            if p > 0 and abs(panels.spans[p - 1, 0] + panels.spans[p - 1, 1] - begin) <= 1e-14:
-                panels.values[p, 0, :size] = panels.values[p - 1, 4, :size]
+            if p > 0 and abs(spans[p - 1, 0] + spans[p - 1, 1] - begin) <= 1e-14:
+                _copy(values[p - 1, 4], values[p, 0], size)
                 first = 1
             for q in range(first, 5):
-                runs, sides = _look(
+                runs, sides = look(
                     movers, faces, amount, begin + length * q / 4, block, shades, blur, extent, room, runs, sides,
-                    panels.values[p, q],
+                    values[p, q],
                 )  # fmt: skip
             looks += 5 - first
-            _judge(panels, p, contacts.speeds[k], span, shutter, peak, size)
+            _judge(panels, p, speeds[k], span, shutter, peak, size)
     over = 0.0
     for p in range(count):
-        over += panels.bounds[p]
+        over += bounds[p]
     while over > target and looks < allowed and count < most:
-        worst = 0
-        for p in range(1, count):
-            if panels.bounds[p] > panels.bounds[worst]:
+        worst = count - 1
+        for p in range(count):
+            if bounds[p] > bounds[worst]:
                 worst = p
-        if not panels.bounds[worst] > 0.0:
+        if not bounds[worst] > 0.0:
             break
-        over -= panels.bounds[worst]
-        begin, length = panels.spans[worst, 0], panels.spans[worst, 1] / 2
-        k = panels.contacts[worst]
+        over -= bounds[worst]
+        begin, length, k = spans[worst, 0], spans[worst, 1] / 2, of[worst]
         if length <= 1e-13 * shutter:
             # as short as time can be told: it stays as it is
-            unresolved += panels.bounds[worst] / peak
-            panels.bounds[worst] = 0.0
+            unresolved += bounds[worst] / peak
+            bounds[worst] = 0.0
             continue
-        faces, amount = contacts.faces[contacts.starts[k] :], contacts.starts[k + 1] - contacts.starts[k]
-        panels.contacts[count] = k
-        panels.spans[count, 0], panels.spans[count, 1] = begin + length, length
-        panels.spans[worst, 1] = length
+        of[count] = k
+        spans[count, 0], spans[count, 1], spans[worst, 1] = begin + length, length, length
         for q in range(3):
-            panels.values[count, 2 * q, :size] = panels.values[worst, 2 + q, :size]
-        panels.values[worst, 4, :size] = panels.values[worst, 2, :size]
-        panels.values[worst, 2, :size] = panels.values[worst, 1, :size]
+            _copy(values[worst, 2 + q], values[count, 2 * q], size)
+        _copy(values[worst, 2], values[worst, 4], size)
+        _copy(values[worst, 1], values[worst, 2], size)
+        for half in range(4):
+            p = worst if half < 2 else count
+            q = 1 + 2 * (half % 2)
+            runs, sides = look(
+                movers, listed[starts[k] :], starts[k + 1] - starts[k], spans[p, 0] + length * q / 4, block, shades,
+                blur, extent, room, runs, sides, values[p, q],
+            )  # fmt: skip
         for half in range(2):
             p = worst if half == 0 else count
-            for q in (1, 3):
-                runs, sides = _look(
-                    movers, faces, amount, panels.spans[p, 0] + length * q / 4, block, shades, blur, extent, room, runs,
-                    sides, panels.values[p, q],
-                )  # fmt: skip
-            _judge(panels, p, contacts.speeds[k], span, shutter, peak, size)
-            over += panels.bounds[p]
+            _judge(panels, p, speeds[k], span, shutter, peak, size)
+            over += bounds[p]
         looks += 4
         count += 1
-    for i in range(block.rows):
-        for j in range(block.columns):
-            bound[i, j] += unresolved * min(1.0, shades.peaks[block.row - block.top - i, block.column - block.left - j])
-    for p in range(count):
-        _sum_up(panels, p, block, shades, shutter, total, bound)
+    _sum_up(panels, count, block, shades, shutter, unresolved, total, bound)
     return looks, runs, sides
 
 
 @njit(cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
-def _look(
+def _copy(values: FloatArray, out: FloatArray, size: int) -> None:
+    for k in range(size):
+        out[k] = values[k]
+
+
+@njit(inline="always")
+def look(
     movers: Movers, faces: IntArray, amount: int, time: float, block: Block, shades: Shades, blur: Blur | None,
     extent: float, room: Room, runs: FloatArray, sides: IntArray, out: FloatArray,
 ) -> tuple[FloatArray, IntArray]:  # fmt: skip
     """Fill `out` with what a cell adds at a time."""
     m = place_faces(movers, faces, amount, time, room)
     return fill_value(
-        room.points, room.starts, room.planes, room.owners, movers.perspective, extent, np.arange(m), m, block,
+        room.points, room.starts, room.planes, room.owners, movers.perspective, extent, room.order, m, block,
         shades, blur, runs, sides, out,
     )  # fmt: skip
 
@@ -181,63 +189,72 @@ def _look(
 @njit(cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
 def _judge(panels: Panels, p: int, speed: float, span: float, shutter: float, peak: float, size: int) -> None:
     """Fill the bound of a panel, and its part that no instant may have seen."""
-    v, share = panels.values[p], panels.spans[p, 1] / shutter
+    values, length = panels.values, panels.spans[p, 1]
     worst = 0.0
     for k in range(size):
-        d = v[0, k] - 3.0 * v[1, k] + 3.0 * v[2, k] - v[3, k]
-        e = v[1, k] - 3.0 * v[2, k] + 3.0 * v[3, k] - v[4, k]
-        worst = max(worst, abs(d) + abs(e))
-    way = speed * panels.spans[p, 1] / 4
-    panels.unseen[p] = share / 4 * span * min(1.0, way * way / 12.0)
-    panels.bounds[p] = share * worst * _SAFETY + panels.unseen[p] * peak
+        worst = max(worst, _third(values[p], k))
+    way = speed * length / 4
+    panels.unseen[p] = length / shutter * span * min(1.0, way * way / 24.0)
+    panels.bounds[p] = length / shutter * worst * _SAFETY + panels.unseen[p] * peak
+
+
+@njit(cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+def _third(values: FloatArray, k: int) -> float:
+    """Return the sum of the absolute third differences of a panel's values."""
+    a, b, c, d, e = values[0, k], values[1, k], values[2, k], values[3, k], values[4, k]
+    return abs(a - 3.0 * b + 3.0 * c - d) + abs(b - 3.0 * c + 3.0 * d - e)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
 def _sum_up(
-    panels: Panels, p: int, block: Block, shades: Shades, shutter: float, total: FloatArray, bound: FloatArray
-) -> None:
-    """Add a panel's integral and bounds."""
-    v, share = panels.values[p], panels.spans[p, 1] / shutter
-    k = 0
-    for i in range(block.rows):
-        for j in range(block.columns):
+    panels: Panels, count: int, block: Block, shades: Shades, shutter: float, unresolved: float, total: FloatArray,
+    bound: FloatArray,
+) -> None:  # fmt: skip
+    """Add the panels' integrals and bounds."""
+    values, spans, unseen, peaks = panels.values, panels.spans, panels.unseen, shades.peaks
+    rows, columns = block.rows, block.columns
+    for p in range(count):
+        share, hidden = spans[p, 1] / shutter, unseen[p]
+        for at in range(rows * columns):
             worst = 0.0
-            for _ in range(3):
-                d = v[0, k] - 3.0 * v[1, k] + 3.0 * v[2, k] - v[3, k]
-                e = v[1, k] - 3.0 * v[2, k] + 3.0 * v[3, k] - v[4, k]
-                worst = max(worst, abs(d) + abs(e))
-                total[k] += share * (v[0, k] + 4.0 * v[1, k] + 2.0 * v[2, k] + 4.0 * v[3, k] + v[4, k]) / 12.0
-                k += 1
-            peak = shades.peaks[block.row - block.top - i, block.column - block.left - j]
-            bound[i, j] += share * worst * _SAFETY + panels.unseen[p] * peak
+            for k in range(3 * at, 3 * at + 3):
+                worst = max(worst, _third(values[p], k))
+                ends, halves = values[p, 0, k] + values[p, 4, k], values[p, 1, k] + values[p, 3, k]
+                total[k] += share * (ends + 4.0 * halves + 2.0 * values[p, 2, k]) / 12.0
+            peak = peaks[block.row - block.top - at // columns, block.column - block.left - at % columns]
+            bound[at] += share * worst * _SAFETY + hidden * peak
+    for at in range(rows * columns):
+        peak = peaks[block.row - block.top - at // columns, block.column - block.left - at % columns]
+        bound[at] += unresolved * min(1.0, peak)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
 def _resolve(
     movers: Movers, faces: IntArray, amount: int, begin: float, length: float, block: Block, extent: float, room: Room,
-    most: int, spans: FloatArray, count: int,
+    most: int, spans: FloatArray,
 ) -> tuple[int, float, int]:  # fmt: skip
-    """Halve a slice until the order of its planes is told between the instants; append its panels to `spans`.
+    """Halve a slice until the order of its planes is told between the instants; write its panels to `spans`.
 
     Returns the number of panels, the length of time for which it is not told, and the number of instants looked at.
     """
     stack = np.empty((_DEEPEST + 2, 3))
-    stack[0] = begin, length, 0.0
-    depth, unresolved, looks = 1, 0.0, 0
+    stack[0, 0], stack[0, 1], stack[0, 2] = begin, length, 0.0
+    depth, count, unresolved, looks = 1, 0, 0.0, 0
     while depth > 0:
         depth -= 1
-        start, size, level = stack[depth]
+        start, size, level = stack[depth, 0], stack[depth, 1], stack[depth, 2]
         looks += 5
-        if not _may_touch(movers, faces, amount, start, size, block, extent, room):
-            spans[count, 0], spans[count, 1] = start, size
-            count += 1
-        elif level < _DEEPEST and count + depth + 2 <= most:
-            stack[depth] = start + size / 2, size / 2, level + 1
-            stack[depth + 1] = start, size / 2, level + 1
-            depth += 2
-        else:
-            spans[count, 0], spans[count, 1] = start, size
-            count += 1
+        touch = _may_touch(movers, faces, amount, start, size, block, extent, room)
+        if touch and level < _DEEPEST and count + depth + 2 <= most:
+            for half in range(2):
+                # the first half on top
+                stack[depth, 0] = start + (1 - half) * size / 2
+                stack[depth, 1], stack[depth, 2] = size / 2, level + 1.0
+                depth += 1
+            continue
+        spans[count, 0], spans[count, 1] = start, size
+        count += 1
+        if touch:
             unresolved += size
     return count, unresolved, looks
 

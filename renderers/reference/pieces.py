@@ -253,6 +253,9 @@ def _may_come_in(
             speed = 2.0 * scale * fastest * length / flat
     else:
         wide = np.sqrt(1.0 + half[0] ** 2 + half[1] ** 2)
+        # nothing of it is so near that it could cross the margin
+        if lowest > near and 1.1 * scale * wide * way <= MARGIN_PX * lowest:
+            return 0.0
         distance = abs(dot(normal, corners[0])) / length if length > 0.0 else 0.0
         if distance > wide * wide * way * (scale / MARGIN_PX + 2.0):
             return 0.0

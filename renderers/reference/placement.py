@@ -115,7 +115,10 @@ def movers_of(faces: Faces, paths: Paths, view: View, frame: int) -> Movers:
 
 
 class Room(NamedTuple):
-    """Where placed faces are written: as `Pieces`, and for each its place in the list asked for (`which`)."""
+    """Where placed faces are written: as `Pieces`, and for each its place in the list asked for (`which`).
+
+    `order` counts them: 0, 1, ...
+    """
 
     work: FloatArray
     points: FloatArray
@@ -123,6 +126,7 @@ class Room(NamedTuple):
     planes: FloatArray
     owners: IntArray
     which: IntArray
+    order: IntArray
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -130,7 +134,7 @@ def room_for(count: int, widest: int) -> Room:
     """Return room for the pieces of `count` faces."""
     return Room(
         np.empty((2, widest, 5)), np.empty((count * widest, 2)), np.zeros(count + 1, np.int64),
-        np.empty((count, 1, 3)), np.empty(count, np.int64), np.empty(count, np.int64),
+        np.empty((count, 1, 3)), np.empty(count, np.int64), np.empty(count, np.int64), np.arange(count),
     )  # fmt: skip
 
 
@@ -266,8 +270,8 @@ def _motion_matrix(kind: int, data: FloatArray, pose: FloatArray, time: float, o
 @njit(cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
 def _rotate(data: FloatArray, turns: float, out: FloatArray) -> None:
     """Fill the rotation by `turns` revolutions; whole and quarter turns are exact, as in `scenes.motion`."""
-    reduced = turns - np.round(turns)
-    quarter = np.round(reduced * 4.0)
+    reduced = turns - np.floor(turns + 0.5)
+    quarter = np.floor(reduced * 4.0 + 0.5)
     rest = 2.0 * np.pi * (reduced - quarter / 4.0)
     c, s = np.cos(rest), np.sin(rest)
     q = int(quarter) % 4

@@ -40,8 +40,12 @@ _WAVE_NODES = 16
 _SHARES = np.concatenate([[np.inf], 1.0 / np.arange(1.0, 21.0)])  # 1 / n
 
 
-def row_primitives(surfaces: Surfaces, degree: int) -> tuple[FloatArray, FloatArray]:
+def row_primitives(
+    surfaces: Surfaces, degree: int, ways: tuple[int, int] = (WALK, WALK_BLEND)
+) -> tuple[FloatArray, FloatArray]:
     """Return the primitives of all rows of texels at their borders, and the rows' means.
+
+    Only pieces of the two `ways` get any, the second of which are blends.
 
     Returns
     -------
@@ -54,9 +58,9 @@ def row_primitives(surfaces: Surfaces, degree: int) -> tuple[FloatArray, FloatAr
     means = np.zeros((len(surfaces.texels), 3))
     blocks: dict[int, tuple[int, int, bool]] = {}
     for m, way in enumerate(surfaces.ways):
-        if way in (WALK, WALK_BLEND):
+        if way in ways:
             h, w, first = (int(n) for n in surfaces.blocks[m])
-            blocks[first] = (h, w, way == WALK_BLEND)
+            blocks[first] = (h, w, way == ways[1])
             if surfaces.shifts[m] != 0.0:
                 for (h, w, first), smooth in zip(surfaces.shifted[m].tolist(), (False, True), strict=True):
                     blocks[first] = (h, w, smooth)

@@ -14,10 +14,13 @@ from numpy.typing import NDArray
 from aliasbench.renderers.reference.coverage import row_extent
 from aliasbench.renderers.reference.faces import Faces
 from aliasbench.renderers.reference.flat import Integral, over_bands, palette, scene_extent
+from aliasbench.renderers.reference.footprints import DEGREE, add_footprint, add_mean, crossings, row_bounds
 from aliasbench.renderers.reference.fragments import between, convex_area, split_pixel
 from aliasbench.renderers.reference.paths import Paths
 from aliasbench.renderers.reference.pieces import Pieces, pieces_at
+from aliasbench.renderers.reference.row_moments import row_primitives
 from aliasbench.renderers.reference.surfaces import (
+    CLIP,
     CLIP_BLEND,
     FLAT,
     PLATE,
@@ -35,9 +38,11 @@ from aliasbench.scenes.projection import View
 
 IntArray = NDArray[np.int64]
 
-# Texels clipped one by one, some 0.1 microseconds each: about what the next best way (`scanlines`) would take.
-MOST_TILES, _TILES_OF_A_PIXEL = 4e7, 6e3
+# Nanoseconds that fragments' outlines may cost, by the borders of texels they cross, before means take over
+MOST_CROSSINGS = 2.4e10
+_WALKED, _CLIPPED = 25.0, 70.0
 _ROUNDING = 4e-12
+_COUNT = -1.0  # crossings are counted instead
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,35 +71,72 @@ def instant_of(
 
 
 def draw_textured(instant: Instant) -> Integral | None:
-    """Return the exact box-filtered picture at one instant, None where that would take too much work."""
+    """Return the box-filtered picture at one instant, None where that would take too much work.
+
+    It is exact up to rounding but in pixels that texels crowd: there the bound is that of a mean, see `footprints`.
+    """
     view, pieces, surfaces, colors = instant.view, instant.pieces, instant.surfaces, instant.colors
-    if surfaces.tiles > MOST_TILES + _TILES_OF_A_PIXEL * view.width * view.height:
-        return None
-    out = np.zeros((view.height, view.width, 3))
+    shape = (view.height, view.width)
+    out, slack = np.zeros((*shape, 3)), np.zeros(shape)
     rules = gauss_table()
+    primitives, means = row_primitives(surfaces, DEGREE, (CLIP, CLIP_BLEND))
+    bounds = row_bounds(surfaces, primitives)
 
-    def draw(rows: NDArray[np.int64]) -> float:
-        return texture_rows(
-            pieces.points, pieces.starts, pieces.planes, pieces.owners, colors, surfaces.ways, surfaces.own,
-            surfaces.along, surfaces.blocks, surfaces.params, surfaces.shifts, surfaces.shifted,
-            surfaces.texels, surfaces.sums, rules, view.perspective, instant.extent, rows, out,
-        )  # fmt: skip
+    def run(limit: float) -> float:
+        def draw(rows: NDArray[np.int64]) -> float:
+            return texture_rows(
+                pieces.points, pieces.starts, pieces.planes, pieces.owners, colors, surfaces.ways, surfaces.own,
+                surfaces.along, surfaces.blocks, surfaces.params, surfaces.shifts, surfaces.shifted, surfaces.texels,
+                surfaces.sums, primitives, means, bounds, rules, view.perspective, instant.extent, limit, rows, slack,
+                out,
+            )  # fmt: skip
 
-    if max(over_bands(draw, view.height)) > 0.0:
+        return max(over_bands(draw, view.height))
+
+    limit = np.inf
+    if most_crossings(instant) > MOST_CROSSINGS:
+        run(_COUNT)
+        steps = np.sort(slack, axis=None)
+        within = np.cumsum(steps) <= MOST_CROSSINGS
+        limit = float(steps[within].max(initial=1.0))
+        slack[:] = 0.0
+    if run(limit) > 0.0:
         return None
     largest = float(np.abs(colors).max() * max(1.0, float(np.abs(surfaces.texels).max())))
-    return Integral(out, np.full(out.shape[:2], surfaces.bound + _ROUNDING * largest))
+    return Integral(out, slack + (surfaces.bound + _ROUNDING * largest))
+
+
+def most_crossings(instant: Instant) -> float:
+    """Return at most how many nanoseconds the borders of texels cost that the outlines of pixels cross, about.
+
+    u and v change in one direction along a line, so each of the lines between pixels crosses every border once.
+    """
+    pieces, surfaces, view = instant.pieces, instant.surfaces, instant.view
+    total = 0.0
+    for m in np.flatnonzero((surfaces.ways != FLAT) & (surfaces.ways != WAVE) & (surfaces.ways != PLATE)):
+        points = pieces.points[pieces.starts[m] : pieces.starts[m + 1]]
+        u, v, q = surfaces.own[m] @ np.c_[points, np.ones(len(points))].T
+        lines = np.minimum(np.ptp(points, axis=0) + 2.0, (view.width, view.height)).sum()
+        price = _WALKED if surfaces.ways[m] in (WALK, WALK_BLEND) else _CLIPPED
+        total += 2.0 * price * float(lines * (np.ptp(u / q) + np.ptp(v / q)))
+    return total
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def texture_rows(
     points: FloatArray, starts: IntArray, planes: FloatArray, owners: IntArray, colors: FloatArray, ways: IntArray,
     own: FloatArray, along: FloatArray, blocks: IntArray, params: FloatArray, shifts: FloatArray, shifted: IntArray,
-    texels: FloatArray, sums: FloatArray, rules: FloatArray, perspective: bool, extent: float, rows: IntArray,
+    texels: FloatArray, sums: FloatArray, primitives: FloatArray, means: FloatArray, bounds: FloatArray,
+    rules: FloatArray, perspective: bool, extent: float, limit: float, rows: IntArray, slack: FloatArray,
     out: FloatArray,
 ) -> float:  # fmt: skip
-    """Add the picture to rows [rows[0], rows[1]) of `out` (h, w, 3); return the area that was given up as too fine."""
+    """Add the picture to rows [rows[0], rows[1]) of `out` (h, w, 3); return the area that was given up as too fine.
+
+    Fragments whose outline crosses borders of texels for more than `limit` nanoseconds show the mean, and `slack`
+    (h, w) gets its bound. With a negative limit nothing is drawn: `slack` gets the price of all such crossings.
+    """
     width, count = out.shape[1], len(owners)
+    brightest = np.abs(colors).max() * max(1.0, np.abs(texels).max())
     ids, cand = np.empty(count, np.int64), np.empty(count, np.int64)
     left, right = np.empty(count), np.empty(count)
     polys, sizes, shown = np.empty((16, 16, 2)), np.empty(16, np.int64), np.empty(16, np.int64)
@@ -125,6 +167,25 @@ def texture_rows(
                 piece = shown[f]
                 owner = owners[piece] if piece >= 0 else -1
                 way = ways[piece] if piece >= 0 else FLAT
+                image = way in (WALK, WALK_BLEND, CLIP, CLIP_BLEND)
+                if image and limit < np.inf:
+                    steps, _ = crossings(polys[f], sizes[f], own[piece])
+                    price = steps * (_WALKED if way in (WALK, WALK_BLEND) else _CLIPPED)
+                    if limit < 0.0:
+                        slack[row, column] += price
+                        continue
+                    if price > limit:
+                        part[:] = 0.0
+                        left_out = add_mean(polys[f], sizes[f], own[piece], bounds[piece], part)
+                        if left_out < np.inf:
+                            most = 0.0
+                            for c in range(3):
+                                most = max(most, abs(colors[owner, c]))
+                                out[row, column, c] += colors[owner, c] * part[c]
+                            slack[row, column] += left_out * most
+                            continue
+                if limit < 0.0:
+                    continue
                 area = convex_area(polys[f], sizes[f])
                 for c in range(3):
                     value[c] = area if way == FLAT else 0.0
@@ -145,10 +206,16 @@ def texture_rows(
                         shifted[piece], texels, sums, part, value,
                     )  # fmt: skip
                 elif way != FLAT:
-                    clip_texels(
-                        polys[f], sizes[f], own[piece], way == CLIP_BLEND, blocks[piece, 0], blocks[piece, 1],
-                        blocks[piece, 2], texels, rules, value,
+                    off = add_footprint(
+                        polys[f], sizes[f], own[piece], way == CLIP_BLEND, blocks[piece], texels, primitives, means,
+                        bounds[piece, 3], rules, value,
                     )  # fmt: skip
+                    slack[row, column] += max(off, 0.0) * brightest * area
+                    if off < 0.0:
+                        clip_texels(
+                            polys[f], sizes[f], own[piece], way == CLIP_BLEND, blocks[piece, 0], blocks[piece, 1],
+                            blocks[piece, 2], texels, rules, value,
+                        )  # fmt: skip
                 for c in range(3):
                     out[row, column, c] += colors[owner, c] * value[c]
     return lost
@@ -164,17 +231,18 @@ def _add_rows(
     With P the running sum of a row, the mean over [u, u + shift] is (P(u + shift) - P(u)) / shift: that of P less what
     grows evenly, plus the row's mean.
     """
-    if shift == 0.0:
-        walk_texels(poly, n, own, along[0], along[1], mode, block[0], block[1], block[2], texels, sums, value)
-        return
-    b = shifted[0]
-    walk_texels(poly, n, own, along[0], along[1], TEXELS, b[0], b[1], b[2], texels, sums, value)
-    b = shifted[1]
-    for end in range(2):
-        rows = own.copy()
+    # one call for all modes: with constants it would be compiled for each
+    for end in range(3 if shift != 0.0 else 1):
+        rows, at, b, factor = mode, own, block, 1.0
+        if shift != 0.0:
+            rows, b = TEXELS, shifted[0]
+            if end < 2:
+                rows, b, factor = ROWS, shifted[1], (2 * end - 1) / shift
+                at = own.copy()
+                for c in range(3):
+                    at[0, c] += end * shift * own[2, c]
         for c in range(3):
-            rows[0, c] += end * shift * own[2, c]
             part[c] = 0.0
-        walk_texels(poly, n, rows, along[0], along[1], ROWS, b[0], b[1], b[2], texels, sums, part)
+        walk_texels(poly, n, at, along[0], along[1], rows, b[0], b[1], b[2], texels, sums, part)
         for c in range(3):
-            value[c] += (2 * end - 1) * part[c] / shift
+            value[c] += factor * part[c]

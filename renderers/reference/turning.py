@@ -11,7 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aliasbench.renderers.reference.faces import Faces
+from aliasbench.renderers.reference.flat import scene_extent
 from aliasbench.renderers.reference.paths import Paths
+from aliasbench.renderers.reference.slabs import TIE
 from aliasbench.scenes.model import FloatArray, Scene
 from aliasbench.scenes.motion import object_matrix
 from aliasbench.scenes.projection import view_at
@@ -109,7 +111,8 @@ def find_rotor(
     backdrop = _backdrop([(p - middle, low, high, owner) for p, low, high, owner in still], rim, furthest)
     if backdrop is None:
         return None
-    return _build(_visible(parts, colors), colors[backdrop], float(sweep), hubs[0])
+    tie = TIE * (furthest if view.perspective else scene_extent(scene))
+    return _build(_visible(parts, colors, tie), colors[backdrop], float(sweep), hubs[0])
 
 
 def still_faces(faces: Faces, paths: Paths) -> Faces:
@@ -157,12 +160,23 @@ def _from_hub(points: FloatArray) -> tuple[bool, float]:
     return inside, float(np.linalg.norm(points + t[:, None] * along, axis=1).min())
 
 
-def _visible(parts: list[tuple[FloatArray, float, int]], colors: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
-    """Return disjoint rings (n, 2), counter-clockwise round what they colour, with their colours."""
+def _visible(
+    parts: list[tuple[FloatArray, float, int]], colors: FloatArray, tie: float
+) -> list[tuple[FloatArray, FloatArray]]:
+    """Return disjoint rings (n, 2), counter-clockwise round what they colour, with their colours.
+
+    Depths no farther apart than `tie` are equal.
+    """
     import shapely
 
-    # nearest first; of equal depths the later object
-    order = sorted(range(len(parts)), key=lambda i: (parts[i][1], -parts[i][2]))
+    # nearest first; of depths that count as equal the later object
+    order = sorted(range(len(parts)), key=lambda i: parts[i][1])
+    layers, layer, start = {}, 0, parts[order[0]][1]
+    for i in order:
+        if parts[i][1] - start > tie:
+            layer, start = layer + 1, parts[i][1]
+        layers[i] = layer
+    order.sort(key=lambda i: (layers[i], -parts[i][2]))
     shapes = np.array([shapely.Polygon(parts[i][0]) for i in order])
     first, second = shapely.STRtree(shapes).query(shapes, predicate="intersects")
     over = first < second

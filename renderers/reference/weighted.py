@@ -93,24 +93,27 @@ def build_cells(spec: FilterSpec, each: int) -> Cells:
 
 def sample_rest(
     cells: Cells, pieces: Pieces, surfaces: Surfaces, colors: FloatArray, means: FloatArray, perspective: bool,
-    extent: float, size: tuple[int, int], seed: int, frame: int,
+    extent: float, size: tuple[int, int], seed: int, frame: int, *, known: bool = True,
 ) -> FloatArray:  # fmt: skip
     """Return an unbiased estimate (h, w, 3) of what `Cells.gather` misses of the scene, from one point in each cell.
 
-    `pieces` and `surfaces` are those of the fine view, `means` (fine h, fine w, 3) the cells' means; or any other
-    values, if `gather` is given the same.
+    `pieces` and `surfaces` are those of the fine view, `means` (fine h, fine w, 3) the cells' means, or unbiased
+    estimates of them, of which `gather` is given the same. If the means are not `known`, they must be zero: the
+    estimate is then of the whole picture, and needs no `gather`.
     """
     out = np.zeros((size[1], size[0], 3))
-    points = np.zeros((len(means), means.shape[1], 5))
+    points, anywhere = np.zeros((len(means), means.shape[1], 5)), np.full(2, -1.0)
+    masses = cells.masses if known else np.zeros_like(cells.masses)
 
     def draw(rows: NDArray[np.int64]) -> None:
-        _sample_rows(
+        sample_rows(
             pieces.points, pieces.starts, pieces.planes, pieces.owners, colors, surfaces.ways, surfaces.own,
-            surfaces.blocks, surfaces.params, surfaces.texels, perspective, extent, seed, frame, means, rows, points,
+            surfaces.blocks, surfaces.params, surfaces.texels, perspective, extent, seed, frame, anywhere, means,
+            rows, points,
         )  # fmt: skip
 
     def weigh(rows: NDArray[np.int64]) -> None:
-        _weigh_rows(points, cells.spec.params, cells.masses, cells.each, cells.margin, rows, out)
+        _weigh_rows(points, cells.spec.params, masses, cells.each, cells.margin, rows, out)
 
     over_bands(draw, len(means))
     over_bands(weigh, size[1])
@@ -118,12 +121,15 @@ def sample_rest(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _sample_rows(
+def sample_rows(
     points: FloatArray, starts: IntArray, planes: FloatArray, owners: IntArray, colors: FloatArray, ways: IntArray,
     own: FloatArray, blocks: IntArray, params: FloatArray, texels: FloatArray, perspective: bool, extent: float,
-    seed: int, frame: int, means: FloatArray, rows: IntArray, out: FloatArray,
+    seed: int, frame: int, shift: FloatArray, means: FloatArray, rows: IntArray, out: FloatArray,
 ) -> None:  # fmt: skip
-    """Fill rows of cells with the place of a random point in each (x, y) and the scene there less the mean."""
+    """Fill rows of cells with the place of a point in each (x, y) and the scene there less the mean.
+
+    The point is random where `shift` is negative, else at `shift` of a cell.
+    """
     width, count = means.shape[1], len(owners)
     ids, left, right = np.empty(count, np.int64), np.empty(count), np.empty(count)
     value = np.empty(3)
@@ -137,7 +143,9 @@ def _sample_rows(
                 ids[n], left[n], right[n] = i, lo, hi
                 n += 1
         for column in range(width):
-            x, y = column + unit(across, column), row + unit(down, column)
+            x, y = column + shift[0], row + shift[1]
+            if shift[0] < 0.0:
+                x, y = column + unit(across, column), row + unit(down, column)
             shown, best = -1, 0.0
             for a in range(n):
                 if left[a] <= x <= right[a] and _is_inside(points, starts[ids[a]], starts[ids[a] + 1], x, y):

@@ -182,10 +182,9 @@ class Stage:
             if o.texture is not None and o.uv is not None:
                 value *= self.rgba(k, uv[mine])[:, :3]
             if o.material.kind == "diffuse" and lights:
-                value *= self._direct(
-                    (origin + z[:, None] * direction)[mine], direction[mine], normal[mine], [c[mine] for c in corners],
-                    [q[mine] for q in lights], u[mine],
-                ) / np.pi  # fmt: skip
+                place = origin[mine] + z[mine, None] * direction[mine]
+                near, quads = [c[mine] for c in corners], [q[mine] for q in lights]
+                value *= self._direct(place, direction[mine], normal[mine], near, quads, u[mine]) / np.pi
             out[mine] = value
         for k, light in enumerate(self.scene.lights):
             mine = owner == LIGHT - k

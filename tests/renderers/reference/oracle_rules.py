@@ -72,6 +72,8 @@ def _heights(stage, kernel, pixel, fraction, most):
         c = corner[0]
         n = np.cross(c[1] - c[0], c[2] - c[0])
         planes.append((n, n @ c[0]))
+        if not stage.perspective:
+            lines.append((n[0], n[1], -(n @ c[0])))  # where it passes through the camera's plane
         for i in range(3):
             p, q = c[i], c[(i + 1) % 3]
             if stage.perspective:

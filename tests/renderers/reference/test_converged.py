@@ -201,22 +201,39 @@ def test_checker_under_a_cone_is_within_its_bound_of_its_squares_as_polygons(mak
     assert np.abs(frame.pixels - truth.pixels).max() <= frame.uncertainty
 
 
-def test_what_would_take_too_many_clips_is_sampled_by_lines(make_polygon, make_scene, monkeypatch):
-    from aliasbench.renderers.reference import textured
-    from aliasbench.renderers.reference.cache import cache_folder
+def test_zone_plate_too_fine_for_quadrature_is_sampled_within_its_bound(make_polygon, make_scene):
+    # some hundred cycles to a pixel leave nothing but the mean, up to a stationary point's share
+    k = 3e5
+    scene = make_scene([make_polygon(SQUARE, texture="z")], textures={"z": ZonePlate((0.5, 0.5), k, 0.3)})
+    frame = render(scene, "reference:", size=(6, 6))
+    assert frame.uncertainty_kind == "confidence"
+    assert frame.samples > 0
+    assert frame.uncertainty is not None
+    assert frame.uncertainty < 3e-2
+    assert np.abs(frame.pixels - 0.5).max() <= frame.uncertainty + np.pi / (2 * k) * 36
 
-    camera = Camera("perspective", position=(0.4, 0.7, 2.0), target=(0, 0, 0), fov_y_deg=40.0)
-    floor = [(-1.0, 0.0, 1.0), (1.0, 0.0, 1.0), (1.0, 0.0, -1.0), (-1.0, 0.0, -1.0)]
-    scene = make_scene([make_polygon(floor, texture="c")], camera=camera, textures={"c": Checker((6.0, 5.0))})
-    size = (12, 9)
-    exact = render(scene, "reference:", size=size)
-    for stored in cache_folder().iterdir():
-        stored.unlink()
-    monkeypatch.setattr(textured, "MOST_TILES", 0.0)
-    monkeypatch.setattr(textured, "_TILES_OF_A_PIXEL", 0.0)
-    lines = render(scene, "reference:", size=size)
-    assert (exact.uncertainty_kind, lines.uncertainty_kind) == ("bound", "confidence")
-    assert lines.samples > 0
-    assert lines.uncertainty is not None
-    assert lines.uncertainty < 2e-3
-    assert 0.0 < np.abs(lines.pixels - exact.pixels).max() <= lines.uncertainty
+
+@pytest.mark.parametrize("keys", ["filter=cone", "filter=box,radius=0.2"])
+def test_turning_texture_under_a_filter_is_within_its_bound_of_exact_instants(make_polygon, make_scene, keys):
+    from aliasbench.scenes.model import Spin
+
+    motion = Motion(spin=Spin((0, 0, 1), (0.1, 0.2, 0.0), 9.0))
+    checker, size, count = {"c": Checker((3.0, 2.0))}, (5, 4), 12
+    scene = make_scene([make_polygon(SQUARE, texture="c", motion=motion)], textures=checker, shutter=0.8)
+    frame = render(scene, f"reference:{keys}", size=size)
+    assert frame.uncertainty_kind == "confidence"
+    assert frame.uncertainty is not None
+    assert frame.uncertainty < 2e-2
+    turned = []
+    for k in range(count):
+        angle = 2 * np.pi * 9.0 * 0.8 / 30 * (k + 0.5) / count
+        corners = []
+        for x, y in SQUARE:
+            dx, dy = x - 0.1, y - 0.2
+            corners.append(
+                (0.1 + dx * np.cos(angle) - dy * np.sin(angle), 0.2 + dx * np.sin(angle) + dy * np.cos(angle))
+            )
+        still = make_scene([make_polygon(corners, texture="c")], textures=checker)
+        turned.append(render(still, f"reference:{keys}", size=size).pixels)
+    # midpoints of a path whose slope changes by at most some units: h^2 / 8 of that
+    assert np.abs(frame.pixels - np.mean(turned, axis=0)).max() <= frame.uncertainty + 5e-3

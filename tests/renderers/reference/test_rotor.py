@@ -171,6 +171,18 @@ def test_perspective_turn_is_the_orthographic_one_at_its_distance(make_polygon, 
     assert np.abs(flat.pixels - deep.pixels).max() < 1e-9
 
 
+def test_of_coplanar_parts_the_later_object_is_seen_whatever_rounding_says(make_polygon, make_scene):
+    motion = spinning(2.2, center=(-0.03, 0.12, 0.0))
+    rng = np.random.default_rng(4)
+    for _ in range(6):
+        rounds = [np.sort(rng.uniform(0, 2 * np.pi, n)) for n in (7, 5, 3)]
+        parts = [
+            make_polygon(np.c_[0.5 * np.cos(a), 0.5 * np.sin(a), np.full(len(a), 0.1)], tuple(c), motion=motion)
+            for a, c in zip(rounds, np.eye(3), strict=True)
+        ]
+        assert_agrees_with_panels(make_scene(parts, shutter=0.8), (3, 4))
+
+
 def test_backdrop_and_still_neighbours(make_polygon, make_scene):
     shape = make_polygon([(0.1, 0.02), (0.5, 0.1), (0.4, 0.3)], (1, 0, 0), motion=spinning(12.0))
     wall = make_polygon([(-2, -2, -1), (2, -2, -1), (2, 2, -1), (-2, 2, -1)], (0, 0.5, 1))
