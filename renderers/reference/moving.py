@@ -45,7 +45,7 @@ _WAYS = np.array([1.0, 2.0, 4.0, 8.0, 16.0, 64.0, 1e3])  # that a pixel's slices
 _PLAIN = 0.5  # share of the instants that may be spent before it is known where they are needed
 _SECTION = 256  # rows whose patches are held at a time
 # Prices in nanoseconds, measured; they set how many instants are looked at, so they are constants and not clocks.
-_LOOK_COST, _MASS_COST, _BUDGET = 2000.0, 150.0, 20e9
+_LOOK_COST, _MASS_COST, _BUDGET = 2000.0, 150.0, 24e9
 
 
 def draw_shutter(

@@ -35,7 +35,7 @@ from aliasbench.scenes.errors import NotAvailableError
 from aliasbench.scenes.model import Scene, content_digest
 from aliasbench.scenes.projection import view_at
 
-ALGORITHM = 4  # changes with anything that changes a reference's pixels: stored ones are not used then
+ALGORITHM = 5  # changes with anything that changes a reference's pixels: stored ones are not used then
 _WIDE = 1e-3  # a bound beyond which sampling may do better
 
 

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from aliasbench.renderers.reference.flat import Integral, over_bands
 from aliasbench.renderers.reference.turning import Rotor
+from aliasbench.renderers.reference.whirl_cuts import MOST_MET, draw_towards, find_knots, find_strips, is_tangled
 from aliasbench.renderers.sampling.filters import FilterSpec, profile_at
 from aliasbench.scenes.model import FloatArray
 
@@ -26,7 +27,7 @@ WIDEST = 12  # pixels of margin beyond which the pixels around a cell are too ma
 _SECTION = 256  # rows whose patches are held at a time
 _MOST_PARTS = 2048  # of a cell
 _SAFETY = 1.5
-_FLOOR = 2e-9  # what a pixel may be off where all rules agree, relative to the largest step of colour
+_FLOOR, _FLOOR_SHARE = 2e-9, 0.03  # added for where all rules agree by accident: of a colour, or of the bound aimed at
 _X7, _W7 = (np.ascontiguousarray(a) for a in np.polynomial.legendre.leggauss(7))
 _X6, _W6 = (np.ascontiguousarray(a) for a in np.polynomial.legendre.leggauss(6))
 _X5, _W5 = (np.ascontiguousarray(a) for a in np.polynomial.legendre.leggauss(5))
@@ -53,7 +54,7 @@ def draw_whirl(rotor: Rotor, size: tuple[int, int], spec: FilterSpec, target: fl
     cuts = np.unique(np.concatenate([np.array([0.0, 1.0]), places]))
     cuts = cuts[np.concatenate([np.array([True]), np.diff(cuts) > 1e-12])]
     circles = rotor.radii[np.concatenate([np.array([True]), np.diff(rotor.radii) > 1e-12 * rotor.radii[-1]])]
-    hub, tolerance = rotor.hub + margin, target / (2 * margin + 1) ** 2 / 4
+    hub, tolerance = rotor.hub + margin, target / (2 * margin + 1) ** 2 / 10
 
     def draw(rows: NDArray[np.int64]) -> tuple[int, FloatArray, FloatArray]:
         top, bottom = max(0, int(rows[0]) - 2 * margin), min(height, int(rows[1]))
@@ -74,8 +75,8 @@ def draw_whirl(rotor: Rotor, size: tuple[int, int], spec: FilterSpec, target: fl
         for top, patch, slack in over_bands(draw_section, min(_SECTION, high - section)):
             pixels[top : top + len(patch)] += patch
             bound[top : top + len(patch)] += slack
-    floor = _FLOOR * float(np.abs(rotor.jumps).max())
-    return Integral(pixels, bound + (rotor.rounding + floor) * spec.gain)
+    floor = max(_FLOOR * float(np.abs(rotor.jumps).max()), _FLOOR_SHARE * target)
+    return Integral(pixels, bound + rotor.rounding * spec.gain + floor)
 
 
 def _kinks(rotor: Rotor) -> FloatArray:
@@ -114,7 +115,12 @@ def _whirl_rows(
     reach, cells = 2 * margin + 1, len(cuts) - 1
     active, near = np.empty(len(edges), np.int64), np.empty(len(kinks), np.int64)
     rings, base = np.empty(len(circles)), np.zeros(channels)
-    sums, line = np.empty((3, reach, reach, channels)), np.empty((reach, channels))
+    sums, total, off = (
+        np.empty((3, reach, reach, channels)),
+        np.empty((reach, reach, channels)),
+        np.empty((reach, reach)),
+    )
+    line = np.empty((reach, channels))
     box = np.empty(4)
     parts = np.empty((_MOST_PARTS + 2, 4))
     for row in range(rows[0], rows[1]):
@@ -157,19 +163,14 @@ def _whirl_rows(
                 while todo > 0:
                     todo -= 1
                     x0, x1, y0, y1 = parts[todo]
-                    sums[:] = 0.0
-                    rules = 3 if _is_tangled(kinks, near, met, rings, ringed, (x0, x1, y0, y1)) else 2
-                    for rule in range(rules):
-                        _integrate_part(
-                            edges, jumps, active, count, base, sweep, kinks, near, met, rings, ringed, hub, row, column,
-                            params, margin, swap, (x0, x1, y0, y1), rule, line, sums[rule],
-                        )  # fmt: skip
-                    off = 0.0
-                    for p in range(reach):
-                        for q in range(reach):
-                            for c in range(channels):
-                                off = max(off, _spread(sums, p, q, c, rules))
-                    if off > tolerance and made < _MOST_PARTS and max(x1 - x0, y1 - y0) > 1e-9:
+                    total[:] = 0.0
+                    off[:] = 0.0
+                    rules = 3 if is_tangled(kinks, near, met, rings, ringed, (x0, x1, y0, y1)) else 2
+                    _integrate_part(
+                        edges, jumps, active, count, base, sweep, kinks, near, met, rings, ringed, hub, row, column,
+                        params, margin, swap, (x0, x1, y0, y1), rules, line, sums, total, off,
+                    )  # fmt: skip
+                    if off.max() > tolerance and made < _MOST_PARTS and max(x1 - x0, y1 - y0) > 1e-9:
                         middle = (x0 + x1) / 2 if x1 - x0 > y1 - y0 else (y0 + y1) / 2
                         if x1 - x0 > y1 - y0:
                             parts[todo], parts[todo + 1] = (x0, middle, y0, y1), (middle, x1, y0, y1)
@@ -182,11 +183,9 @@ def _whirl_rows(
                         for q in range(max(0, 2 * margin - column), min(reach, width + 2 * margin - column)):
                             # p, q count from the farthest pixel above and to the left
                             at, to = row - 2 * margin + p - top, column - 2 * margin + q
-                            worst = 0.0
                             for c in range(channels):
-                                patch[at, to, c] += sums[0, p, q, c]
-                                worst = max(worst, _spread(sums, p, q, c, rules))
-                            slack[at, to] += worst
+                                patch[at, to, c] += total[p, q, c]
+                            slack[at, to] += off[p, q]
 
 
 @njit(cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
@@ -210,66 +209,45 @@ def _spread(sums: FloatArray, p: int, q: int, c: int, rules: int) -> float:
 
 
 @njit(cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
-def _is_tangled(
-    kinks: FloatArray, near: IntArray, met: int, rings: FloatArray, ringed: int,
-    box: tuple[float, float, float, float],
-) -> bool:  # fmt: skip
-    """Return whether a kink or a circle may run through a rectangle, or the hub lies in it."""
-    x0, x1, y0, y1 = box
-    count = 0
-    for i in range(met):
-        a, b, c, d = kinks[near[i]]
-        if max(a, c) >= x0 and min(a, c) <= x1 and max(b, d) >= y0 and min(b, d) <= y1:
-            # on which sides of the line are the corners?
-            f = (c - a) * ((y0 + y1) / 2 - b) - (d - b) * ((x0 + x1) / 2 - a)
-            if abs(f) <= (abs(c - a) * (y1 - y0) + abs(d - b) * (x1 - x0)) / 2:
-                count += 1
-    x = 0.0 if x0 < 0.0 < x1 else min(abs(x0), abs(x1))
-    y = 0.0 if y0 < 0.0 < y1 else min(abs(y0), abs(y1))
-    far_x, far_y = max(abs(x0), abs(x1)), max(abs(y0), abs(y1))
-    for k in range(ringed):
-        if x * x + y * y <= rings[k] * rings[k] <= far_x * far_x + far_y * far_y:
-            count += 1
-    return count > 0 or (x == 0.0 and y == 0.0)
-
-
-@njit(cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
 def _integrate_part(
     edges: FloatArray, jumps: FloatArray, active: IntArray, count: int, base: FloatArray, sweep: float,
     kinks: FloatArray, near: IntArray, met: int, rings: FloatArray, ringed: int, hub: FloatArray, row: int, column: int,
-    params: FloatArray, margin: int, swap: bool, box: tuple[float, float, float, float], rule: int, line: FloatArray,
-    out: FloatArray,
+    params: FloatArray, margin: int, swap: bool, box: tuple[float, float, float, float], rules: int, line: FloatArray,
+    sums: FloatArray, out: FloatArray, off: FloatArray,
 ) -> None:  # fmt: skip
     """Add the integral of pattern times filter over a rectangle to `out` (pixels, pixels, channels).
 
-    u is measured along lines, v across them.
+    Its bound is added to `off` (pixels, pixels). u is measured along lines, v across them.
     """
-    x, w = (_X7, _W7) if rule == 0 else ((_X5, _W5) if rule == 1 else (_X6, _W6))
     channels, reach = out.shape[2], 2 * margin + 1
     a, b = 2 if swap else 0, 0 if swap else 2
     u0, u1, v0, v1 = box[a], box[a + 1], box[b], box[b + 1]
     # an axis of the picture from hub coordinates: place = origin + sense * u, from the corner of the pixel farthest off
     origin_u, sense_u = (hub[1] - row, -1.0) if swap else (hub[0] - column, 1.0)
     origin_v, sense_v = (hub[0] - column, 1.0) if swap else (hub[1] - row, -1.0)
-    strips, knots = np.empty(2 + 4 * met + 6 * ringed), np.empty(2 + met + 2 * ringed)
+    strips, knots = np.empty(2 + 4 * met + 6 * ringed + MOST_MET**2), np.empty(2 + met + 2 * ringed)
     round_ = np.empty(len(knots), np.bool_)
     value = np.empty(channels)
-    n = _strips(kinks, near, met, rings, ringed, swap, u0, u1, v0, v1, strips)
+    n = find_strips(kinks, near, met, rings, ringed, swap, u0, u1, v0, v1, strips)
     for strip in range(n - 1):
         half_v, middle_v = (strips[strip + 1] - strips[strip]) / 2, (strips[strip + 1] + strips[strip]) / 2
         if not half_v > 1e-14:
             continue
-        for i in range(len(x)):
+        sums[:] = 0.0
+        for number in range(7 + 5 + (6 if rules > 2 else 0)):
+            rule = 0 if number < 7 else (1 if number < 12 else 2)
+            i = number if rule == 0 else (number - 7 if rule == 1 else number - 12)
+            x, w = (_X7, _W7) if rule == 0 else ((_X5, _W5) if rule == 1 else (_X6, _W6))
             v = middle_v + half_v * x[i]
             line[:] = 0.0
-            m = _knots(kinks, near, met, rings, ringed, swap, u0, u1, v, knots, round_)
+            m = find_knots(kinks, near, met, rings, ringed, swap, u0, u1, v, knots, round_)
             for k in range(m - 1):
                 half = (knots[k + 1] - knots[k]) / 2
                 if not half > 1e-14:
                     continue
                 for j in range(len(x)):
                     # square roots begin at circles: the rule is drawn towards them
-                    t, weight = _draw(x[j], round_[k], round_[k + 1])
+                    t, weight = draw_towards(x[j], round_[k], round_[k + 1])
                     u = knots[k] + half * (1.0 + t)
                     px, py = (v, u) if swap else (u, v)
                     _pattern(edges, jumps, active, count, base, sweep, px, py, value)
@@ -285,98 +263,16 @@ def _integrate_part(
                 for q in range(reach):
                     for c in range(channels):
                         if swap:
-                            out[q, p, c] += g * line[q, c]
+                            sums[rule, q, p, c] += g * line[q, c]
                         else:
-                            out[p, q, c] += g * line[q, c]
-
-
-@njit(cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
-def _draw(x: float, first: bool, last: bool) -> tuple[float, float]:
-    """Return a place in [-1, 1] drawn towards one end or both, and its weight."""
-    t = (1.0 + x) / 2
-    if first and last:
-        return 2.0 * t * t * (3.0 - 2.0 * t) - 1.0, 6.0 * t * (1.0 - t)
-    if first:
-        return 2.0 * t * t - 1.0, 2.0 * t
-    if last:
-        return 1.0 - 2.0 * (1.0 - t) * (1.0 - t), 2.0 * (1.0 - t)
-    return x, 1.0
-
-
-@njit(cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
-def _strips(
-    kinks: FloatArray, near: IntArray, met: int, rings: FloatArray, ringed: int, swap: bool, u0: float, u1: float,
-    v0: float, v1: float, out: FloatArray,
-) -> int:  # fmt: skip
-    """Fill the sorted v at which kinks begin or end, or kinks and circles meet the sides u0 and u1; return how many."""
-    n = _insert(out, 0, v0)
-    for a in range(met):
-        p, q, r, s = kinks[near[a]]
-        if swap:
-            p, q, r, s = q, p, s, r
-        for end in (q, s):
-            if v0 < end < v1:
-                n = _insert(out, n, end)
-        for u in (u0, u1):
-            if min(p, r) < u < max(p, r):
-                v = q + (u - p) / (r - p) * (s - q)
-                if v0 < v < v1:
-                    n = _insert(out, n, v)
-    for k in range(ringed):
-        for u in (u0, u1, 0.0):
-            if abs(u) < rings[k]:
-                v = np.sqrt((rings[k] - u) * (rings[k] + u))
-                if v0 < v < v1:
-                    n = _insert(out, n, v)
-                if v0 < -v < v1:
-                    n = _insert(out, n, -v)
-    return _insert(out, n, v1)
-
-
-@njit(cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
-def _knots(
-    kinks: FloatArray, near: IntArray, met: int, rings: FloatArray, ringed: int, swap: bool, u0: float, u1: float,
-    v: float, out: FloatArray, round_: NDArray[np.bool_],
-) -> int:  # fmt: skip
-    """Fill the sorted u at which a line meets kinks and circles, and which are circles; return how many."""
-    n = _insert(out, 0, u0)
-    round_[0] = False
-    for a in range(met):
-        p, q, r, s = kinks[near[a]]
-        if swap:
-            p, q, r, s = q, p, s, r
-        if min(q, s) < v < max(q, s):
-            u = p + (v - q) / (s - q) * (r - p)
-            if u0 < u < u1:
-                n = _insert_marked(out, n, u, round_, False)
-    for k in range(ringed):
-        if abs(v) < rings[k]:
-            u = np.sqrt((rings[k] - v) * (rings[k] + v))
-            if u0 < u < u1:
-                n = _insert_marked(out, n, u, round_, True)
-            if u0 < -u < u1:
-                n = _insert_marked(out, n, -u, round_, True)
-    return _insert_marked(out, n, u1, round_, False)
-
-
-@njit(cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
-def _insert(values: FloatArray, n: int, value: float) -> int:
-    i = n
-    while i > 0 and values[i - 1] > value:
-        values[i] = values[i - 1]
-        i -= 1
-    values[i] = value
-    return n + 1
-
-
-@njit(cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
-def _insert_marked(values: FloatArray, n: int, value: float, marks: NDArray[np.bool_], mark: bool) -> int:
-    i = n
-    while i > 0 and values[i - 1] > value:
-        values[i], marks[i] = values[i - 1], marks[i - 1]
-        i -= 1
-    values[i], marks[i] = value, mark
-    return n + 1
+                            sums[rule, p, q, c] += g * line[q, c]
+        for p in range(reach):
+            for q in range(reach):
+                worst = 0.0
+                for c in range(channels):
+                    out[p, q, c] += sums[0, p, q, c]
+                    worst = max(worst, _spread(sums, p, q, c, rules))
+                off[p, q] += worst
 
 
 @njit(cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
