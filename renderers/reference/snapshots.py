@@ -31,6 +31,7 @@ _ROUNDING = 1e-12
 # Nanoseconds of one core, measured once: for a pixel, one that edges cross, a face, a picture, a term of a filter
 _PIXEL, _CROSSED, _FACE, _PICTURE, _TERM = 15.0, 900.0, 2000.0, 2e5, 8.0
 _TEXTURED, _TEXEL, _LINE = 1500.0, 100.0, 300.0  # a textured pixel, a texel clipped alone, a pixel on a line
+_TEXTURED_PICTURE = 1.5e6  # setting up the tables of a textured picture, whatever its size
 _LINES = 2  # of a row of cells, where texels are too fine to be clipped
 _LIT, _SHADOW, _POINTS = 1000.0, 100.0, 2  # a lit point, an occluder that may shade it, points to a pixel
 _CELLS = 3  # to a pixel along one axis, under wide filters
@@ -160,11 +161,13 @@ class TexturedPictures:
         if exact is None:
             means, bound = _scan(at, self.table, seed, shot.frame), _ROUNDING
             ends = _texel_rows(at) * view.height * _LINES
-            self.tally.nanoseconds += _PICTURE + pixels * _LINES * _LINE * len(at.pieces.owners) + ends * _TEXEL
+            self.tally.nanoseconds += (
+                _TEXTURED_PICTURE + pixels * _LINES * _LINE * len(at.pieces.owners) + ends * _TEXEL
+            )
         else:
             means, bound = exact.pixels, float(exact.bound.max())
             texels = at.surfaces.tiles + _texel_rows(at) * view.width
-            self.tally.nanoseconds += _PICTURE + pixels * _TEXTURED + texels * _TEXEL
+            self.tally.nanoseconds += _TEXTURED_PICTURE + pixels * _TEXTURED + texels * _TEXEL
         if cells is None:
             out += means
             return bound
