@@ -136,7 +136,7 @@ def row_values(stage: Stage, kernel, pixel, py, fraction, a, b, nodes):
     rows = _rows(stage, py, fraction, a, b, window)
     keep = [k for k in range(len(stage.faces)) if (rows.last[k] > rows.first[k]).any()]
     breaks = [np.full((n, 1), window[0]), np.full((n, 1), window[1])]
-    smooth, waves = False, 0.0
+    smooth = False
     for k in keep:
         face = stage.faces[k]
         lo, hi = rows.first[k], rows.last[k]
@@ -158,12 +158,12 @@ def row_values(stage: Stage, kernel, pixel, py, fraction, a, b, nodes):
             breaks.append(_crossings(_wave_form(texture, rows.u[k], rows.v[k]), 1.0, 0.0, lo, hi, stage))
         elif multiplier is None:
             smooth = True
-            waves = max(waves, _wave_count(stage, texture, rows.u[k], rows.v[k], lo, hi))
+            parts = int(np.ceil(_wave_count(stage, texture, rows.u[k], rows.v[k], lo, hi))) + 1
+            breaks.append(lo[:, None] + (hi - lo)[:, None] * np.linspace(0.0, 1.0, parts + 1))
         elif stage.linear and isinstance(texture, ImageTexture):
             smooth = True
     if smooth:
-        parts = int(np.ceil(waves)) + 1
-        knots = np.unique([*np.linspace(*window, parts + 1), *(centre + np.array(kernel.knots))])
+        knots = np.unique([*window, *(centre + np.array(kernel.knots))])
         breaks.append(np.broadcast_to(knots, (n, len(knots))))
     oy = (py - pixel[0] - 0.5)[:, None]
     if kernel.name == "cone":
