@@ -79,5 +79,6 @@ def describe(section: str, rows: Rows) -> list[str]:
         lines.append(f"  {row['name']!s:<{width}}  {row['summary']}".rstrip())
         parameters = row.get("parameters")
         for name, p in parameters.items() if isinstance(parameters, dict) else ():
-            lines.append(f"  {'':<{width}}    {name}={p['default']}: {p['meaning']} ({p['low']} to {p['high']})")
+            allowed = " or ".join(p["names"]) if "names" in p else f"{p['low']} to {p['high']}"
+            lines.append(f"  {'':<{width}}    {name}={p['default']}: {p['meaning']} ({allowed})")
     return lines

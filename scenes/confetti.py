@@ -14,6 +14,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from aliasbench.scenes.entries import Parameter, SceneEntry
 from aliasbench.scenes.model import Animation, Facts, FloatArray, Motion, PanFact, Scene, Surface, Vec3
 from aliasbench.scenes.shapes import mesh
 from aliasbench.scenes.staging import FPS, flat_camera, loop_frames
@@ -100,3 +101,19 @@ def _cell(count: int, largest: float, seed: int) -> tuple[FloatArray, NDArray[np
 def _vec3(vector: FloatArray) -> Vec3:
     x, y, z = vector.tolist()
     return (x, y, z)
+
+
+ENTRIES = (
+    SceneEntry(
+        "confetti",
+        "small triangles that drift over the pixel centres: they flicker on and off",
+        "confetti",
+        build_confetti,
+        {
+            "count": Parameter(4000, 8, 20000, "int", "triangles in a square of the picture's height"),
+            "size_px": Parameter(1.5, 0.2, 20.0, "float", "largest diameter, in pixels of a picture 256 high"),
+            "seed": Parameter(1, 0, 2**31 - 1, "int", "of places, shapes and colours"),
+            "speed": Parameter(0.08, -2.0, 2.0, "float", "drift to the right and up, world units per second"),
+        },
+    ),
+)

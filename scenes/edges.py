@@ -13,6 +13,7 @@ import math
 
 import numpy as np
 
+from aliasbench.scenes.entries import Parameter, SceneEntry
 from aliasbench.scenes.errors import InputError
 from aliasbench.scenes.model import Animation, EdgeFact, Facts, Motion, Scene, Spin, Surface, Vec3
 from aliasbench.scenes.shapes import polygon, quad
@@ -85,3 +86,28 @@ def build_edge_fan(*, name: str, wedges: int, rev_per_s: float) -> Scene:
 def _vec3(point: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> Vec3:
     x, y, z = point.tolist()
     return (x, y, z)
+
+
+ENTRIES = (
+    SceneEntry(
+        "near-horizontal-edge",
+        "one straight edge, nearly along the pixel rows: long stairsteps",
+        "edges",
+        build_near_horizontal_edge,
+        {
+            "slope": Parameter(0.1, -4.0, 4.0, "float", "rise over run of the edge"),
+            "offset": Parameter(0.0, -1.0, 1.0, "float", "height of the edge at the middle, world units"),
+            "speed": Parameter(0.0, -2.0, 2.0, "float", "upward pan of the edge, world units per second"),
+        },
+    ),
+    SceneEntry(
+        "edge-fan",
+        "thick and thin wedges at many angles: where stairsteps are worst",
+        "edges",
+        build_edge_fan,
+        {
+            "wedges": Parameter(18, 4, 128, "int", "wedges in the circle, thick and thin in turn; even"),
+            "rev_per_s": Parameter(0.0, -10.0, 10.0, "float", "turns per second of the whole fan"),
+        },
+    ),
+)

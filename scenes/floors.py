@@ -16,6 +16,7 @@ from functools import lru_cache
 from importlib.util import find_spec
 from pathlib import Path
 
+from aliasbench.scenes.entries import Parameter, SceneEntry
 from aliasbench.scenes.errors import InputError
 from aliasbench.scenes.model import Animation, Camera, ImageTexture, Scene
 from aliasbench.scenes.shapes import quad
@@ -63,3 +64,17 @@ def brick_photo() -> ImageTexture:
     if package is None or package.origin is None:
         raise InputError("scene 'brick-floor' needs scikit-image's photograph of bricks; install scikit-image")
     return load_image(Path(package.origin).parent / "data" / "brick.png", source="skimage/data/brick.png")
+
+
+ENTRIES = (
+    SceneEntry(
+        "brick-floor",
+        "a photograph of bricks on a receding floor under a slow pan: far texture shimmers",
+        "floors",
+        build_brick_floor,
+        {
+            "speed": Parameter(0.5, -4.0, 4.0, "float", "sideways pan of the camera, world units per second"),
+            "shutter": Parameter(0.0, 0.0, 1.0, "float", "open share of the frame interval"),
+        },
+    ),
+)

@@ -12,6 +12,7 @@ are a whole number of turns wherever the rate allows it within ten seconds.
 
 import math
 
+from aliasbench.scenes.entries import Parameter, SceneEntry
 from aliasbench.scenes.errors import InputError
 from aliasbench.scenes.model import Animation, Facts, Motion, RotorFact, Scene, Spin
 from aliasbench.scenes.shapes import polygon
@@ -46,3 +47,21 @@ def build_propeller(
         animation=Animation(fps=float(FPS), frames=loop_frames(rev_per_s), shutter=shutter),
         facts=Facts(rotors=(RotorFact(center, axis, blades, duty, rev_per_s, inner, outer),)),
     )
+
+
+ENTRIES = (
+    SceneEntry(
+        "propeller",
+        "blades that turn too fast for the frame rate: they stand still or run backwards",
+        "propeller",
+        build_propeller,
+        {
+            "blades": Parameter(3, 1, 60, "int", "number of blades"),
+            "rev_per_s": Parameter(1.0, -1000.0, 1000.0, "float", "turns per second, counter-clockwise"),
+            "duty": Parameter(0.5, 0.05, 0.95, "float", "bright share of the circle"),
+            "shutter": Parameter(0.0, 0.0, 1.0, "float", "open share of the frame interval"),
+            "inner": Parameter(0.3, 0.1, 0.8, "float", "inner radius of the metrics' annulus, world units"),
+            "outer": Parameter(0.85, 0.2, 0.9, "float", "outer radius of the metrics' annulus, world units"),
+        },
+    ),
+)

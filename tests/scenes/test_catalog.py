@@ -7,13 +7,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from aliasbench.scenes.catalog import SCENES, Parameter, build_scene
+from aliasbench.scenes.catalog import SCENES, build_scene
+from aliasbench.scenes.entries import Choice, Parameter
 from aliasbench.scenes.errors import InputError
 from aliasbench.scenes.files import load_scene
 from aliasbench.scenes.projection import view_at
 
 NAMES = sorted(SCENES)
-SETTINGS = [(name, key) for name in NAMES for key in SCENES[name].parameters]
+SETTINGS = [(name, key) for name in NAMES for key, p in SCENES[name].parameters.items() if isinstance(p, Parameter)]
+CHOICES = [(name, key) for name in NAMES for key, p in SCENES[name].parameters.items() if isinstance(p, Choice)]
 # Parameters that only make sense together: what one needs when set to its low or high end.
 TOGETHER = {
     ("propeller", "inner", 0.8): {"outer": 0.9},
@@ -48,6 +50,7 @@ def test_a_scenes_name_builds_it_again(name: str) -> None:
 def test_parameters_take_both_ends_of_their_range_and_the_name_says_so(name: str, key: str) -> None:
     entry = SCENES[name]
     parameter = entry.parameters[key]
+    assert isinstance(parameter, Parameter)
     assert parameter.low <= parameter.default <= parameter.high
     for value in {parameter.low, parameter.high} - {parameter.default}:
         others = TOGETHER.get((name, key, value), {})
@@ -61,6 +64,7 @@ def test_parameters_take_both_ends_of_their_range_and_the_name_says_so(name: str
 def test_parameters_refuse_what_is_out_of_range_or_no_number(name: str, key: str) -> None:
     entry = SCENES[name]
     parameter = entry.parameters[key]
+    assert isinstance(parameter, Parameter)
     beyond: tuple[Any, ...] = (
         parameter.high + 1,
         parameter.low - 1,
@@ -81,7 +85,21 @@ def test_parameters_refuse_what_is_out_of_range_or_no_number(name: str, key: str
         )
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize(("name", "key"), CHOICES)
+def test_words_are_chosen_from_a_list_and_the_name_says_which(name: str, key: str) -> None:
+    entry = SCENES[name]
+    parameter = entry.parameters[key]
+    assert isinstance(parameter, Choice)
+    for word in parameter.names:
+        scene = entry.build(**{key: word})
+        assert (f"{key}={word}" in scene.name) == (word != parameter.default)
+        assert load_scene(scene.name) == scene
+    for wrong in (parameter.names[0] + "s", "", 1, None):
+        with pytest.raises(InputError, match=f"parameter {key} = .*: must be {' or '.join(parameter.names)}"):
+            entry.build(**{key: wrong})
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if SCENES[name].parameters])
 def test_unknown_parameters_are_refused_with_the_nearest(name: str) -> None:
     key = next(iter(SCENES[name].parameters))
     with pytest.raises(InputError, match=f"scene '{name}': unknown parameter '{key}s'; did you mean '{key}'") as caught:
