@@ -26,6 +26,7 @@ from aliasbench.renderers.raster.projection import MOST_DISTANT, clip_matrices, 
 from aliasbench.renderers.raster.targets import Target
 from aliasbench.renderers.sampling.patterns import pattern_frame, sample_set, sampler_code
 from aliasbench.renderers.technique import Technique
+from aliasbench.renderers.unlit import check_unlit
 from aliasbench.scenes.errors import InputError, NotAvailableError
 from aliasbench.scenes.model import Scene
 from aliasbench.scenes.motion import shutter_fraction
@@ -37,7 +38,9 @@ def prepare_raster(scene: Scene, technique: Technique, size: tuple[int, int]) ->
     Raises
     ------
     NotAvailableError
-        For a documented feature that the rasterizer does not have yet.
+        For a documented technique that the rasterizer does not have yet.
+    UnsupportedScene
+        For what the scene has and the rasterizer does not draw.
     InputError
         If the device lacks the hardware samples asked for or cannot hold a picture of this size, or a number of the
         scene is beyond 32-bit graphics.
@@ -53,8 +56,6 @@ def prepare_raster(scene: Scene, technique: Technique, size: tuple[int, int]) ->
 
 
 def _check_available(scene: Scene, technique: Technique) -> None:
-    lit = any(o.material.kind == "diffuse" for o in scene.objects) and bool(scene.lights)
-    special = next((o.material.kind for o in scene.objects if o.material.kind in ("glossy", "glass")), None)
     missing = (
         (technique.filter != "box", f"filter={technique.filter}", "filter=box"),
         (technique.radius_px != 0.5, f"filter=box,radius={technique.radius_px:g}", "radius=0.5"),
@@ -63,15 +64,12 @@ def _check_available(scene: Scene, technique: Technique) -> None:
         (technique.post != "none", f"post={technique.post}", "post=none"),
         (technique.alpha_to_coverage, "alpha_to_coverage=on", "alpha_to_coverage=off"),
         (technique.motion != "exact", f"motion={technique.motion}", "motion=exact"),
-        (scene.camera.lens_radius > 0, f"a lens (lens_radius = {scene.camera.lens_radius:g})", "lens_radius = 0"),
-        (special is not None, f"material {special!r}", "unlit, and diffuse without lights"),
-        (lit, "diffuse material under a light", "unlit, and diffuse without lights"),
-        (bool(scene.lights), "a visible light", "scenes without lights"),
     )
     for wanted, feature, available in missing:
         if wanted:
             raise NotAvailableError(f"raster: {feature} is not available yet; available: {available}")
     sampler_code(technique.sampler)
+    check_unlit("raster", scene)
 
 
 def _check_range(scene: Scene) -> None:

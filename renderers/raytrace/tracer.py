@@ -31,7 +31,8 @@ from aliasbench.renderers.raytrace.tables import (
 from aliasbench.renderers.sampling.hashing import frame_key
 from aliasbench.renderers.sampling.patterns import pattern_frame, sampler_code
 from aliasbench.renderers.technique import Technique
-from aliasbench.scenes.errors import InputError, NotAvailableError
+from aliasbench.renderers.unlit import check_unlit
+from aliasbench.scenes.errors import InputError, NotAvailableError, UnsupportedScene
 from aliasbench.scenes.model import FloatArray, ImageTexture, Scene
 
 THREADS_VARIABLE = "ALIASBENCH_THREADS"
@@ -77,7 +78,7 @@ def thread_count() -> int:
 
 
 def check_available(scene: Scene, technique: Technique) -> None:
-    """Raise `NotAvailableError` for what the ray tracer does not have yet."""
+    """Raise for what the ray tracer does not have: `NotAvailableError` a technique's, `UnsupportedScene` a scene's."""
     t = technique
     sampler_code(t.sampler)
     refused: tuple[tuple[bool, str, str], ...] = (
@@ -86,24 +87,16 @@ def check_available(scene: Scene, technique: Technique) -> None:
         (t.adaptive != "off", f"adaptive={t.adaptive}", "adaptive=off"),
         (t.motion != "exact", f"motion={t.motion}", "motion=exact"),
         (t.texture == "ewa", "texture=ewa", "texture=point, linear, mipmap and trilinear"),
-        (scene.camera.lens_radius > 0.0, f"camera lens_radius={scene.camera.lens_radius:g}", "lens_radius=0"),
-        (bool(scene.lights), f"a scene with lights ({len(scene.lights)})", "scenes without lights"),
     )
     for is_refused, asked, instead in refused:
         if is_refused:
             raise NotAvailableError(f"{asked} is not available in the ray tracer yet; available: {instead}")
-    for index, surface in enumerate(scene.objects):
-        name = surface.name or f"number {index}"
-        if surface.material.kind not in ("unlit", "diffuse"):
-            raise NotAvailableError(
-                f"material={surface.material.kind} (object {name}) is not available in the ray tracer yet; "
-                "available: unlit, and diffuse without lights"
-            )
+    check_unlit("raytrace", scene)
+    for surface in scene.objects:
         texture = scene.textures[surface.texture] if surface.texture is not None else None
         if isinstance(texture, ImageTexture) and texture.alpha_cutoff is not None:
-            raise NotAvailableError(
-                f"alpha_cutoff (texture {surface.texture}) is not available in the ray tracer yet; "
-                "available: images without alpha_cutoff"
+            raise UnsupportedScene(
+                f"raytrace: alpha_cutoff (texture {surface.texture}) is not drawn; images without it are"
             )
 
 
@@ -113,7 +106,9 @@ def prepare_raytrace(scene: Scene, technique: Technique, size: tuple[int, int]) 
     Raises
     ------
     NotAvailableError
-        For a documented feature that the ray tracer does not have yet.
+        For a documented technique that the ray tracer does not have yet.
+    UnsupportedScene
+        For what the scene has and the ray tracer does not draw.
     InputError
         For a degenerate camera, or a bad ALIASBENCH_THREADS.
     """

@@ -31,7 +31,7 @@ from aliasbench.renderers.reference.paths import Paths, scene_paths
 from aliasbench.renderers.reference.snapshots import FlatPictures, LitPictures, Shot, TexturedPictures
 from aliasbench.renderers.sampling.filters import FilterSpec, filter_of
 from aliasbench.renderers.technique import Technique
-from aliasbench.scenes.errors import NotAvailableError
+from aliasbench.scenes.errors import UnsupportedScene
 from aliasbench.scenes.model import Scene, content_digest
 from aliasbench.scenes.projection import view_at
 
@@ -188,17 +188,17 @@ def prepare_reference(scene: Scene, technique: Technique, size: tuple[int, int])
 
     Raises
     ------
-    NotAvailableError
-        For a feature that references do not have yet.
+    UnsupportedScene
+        For what the scene has and references do not draw.
     """
     start = time.perf_counter()
     spec = filter_of(technique)
     _refuse_missing(scene)
     drawn = expand(scene, linear=technique.texture == "linear")
     if drawn is None and scene.lights:
-        raise NotAvailableError(
+        raise UnsupportedScene(
             "reference: lights on images that are cut out along curves (alpha_cutoff with texture=linear), or into "
-            "more faces than can be built, are not available yet; available: texture=point with fewer texels"
+            "more faces than can be built, are not drawn; texture=point with fewer texels is"
         )
     shown = scene if drawn is None else drawn
     paths = scene_paths(shown, interpolated=technique.motion == "matrix")
@@ -209,9 +209,9 @@ def prepare_reference(scene: Scene, technique: Technique, size: tuple[int, int])
 
 def _refuse_missing(scene: Scene) -> None:
     """Raise for what a scene has and references do not have yet."""
-    for surface in scene.objects:
+    for index, surface in enumerate(scene.objects):
         if surface.material.kind not in ("unlit", "diffuse"):
-            raise NotAvailableError(
-                f"reference: material {surface.material.kind} is not available yet; "
-                "available: unlit and diffuse, with or without lights"
+            raise UnsupportedScene(
+                f"reference: material {surface.material.kind} (object {surface.name or f'number {index}'}) is not "
+                "drawn; unlit and diffuse are, with or without lights"
             )

@@ -12,7 +12,7 @@ from aliasbench.renderers.raster.context import acquire_context
 from aliasbench.renderers.raster.projection import DepthRule
 from aliasbench.renderers.raster.targets import Target
 from aliasbench.renderers.technique import parse_technique
-from aliasbench.scenes.errors import InputError, NotAvailableError
+from aliasbench.scenes.errors import InputError, NotAvailableError, UnsupportedScene
 from aliasbench.scenes.model import Light, Material
 
 pytestmark = pytest.mark.usefixtures("gl_checked")
@@ -87,19 +87,19 @@ def test_features_that_are_not_there_yet_say_what_is(make, technique, feature):
         prepare(make.star(), technique, size=SIZE)
 
 
-def test_materials_lights_and_lenses_say_that_they_are_not_there_yet(make):
+def test_materials_lights_and_lenses_that_are_not_drawn_are_named(make):
     star = make.star()
     light = Light(((0, 0, 2), (1, 0, 2), (1, 1, 2), (0, 1, 2)), (1.0, 1.0, 1.0))
     diffuse = tuple(replace(s, material=Material("diffuse")) for s in star.objects)
     glass = tuple(replace(s, material=Material("glass")) for s in star.objects)
     lens = replace(star.camera, lens_radius=0.1)
     for scene, feature in (
-        (replace(star, lights=(light,)), "a visible light"),
-        (replace(star, lights=(light,), objects=diffuse), "diffuse material under a light"),
-        (replace(star, objects=glass), "material 'glass'"),
-        (replace(star, camera=lens), r"a lens \(lens_radius = 0.1\)"),
+        (replace(star, lights=(light,)), r"lights \(1\) are"),
+        (replace(star, lights=(light,), objects=diffuse), r"lights \(1\) are"),
+        (replace(star, objects=glass), r"material glass \(object .*\) is"),
+        (replace(star, camera=lens), r"a lens \(lens_radius = 0.1\) is"),
     ):
-        with pytest.raises(NotAvailableError, match=f"raster: {feature} is not available yet; available: "):
+        with pytest.raises(UnsupportedScene, match=f"raster: {feature} not drawn; "):
             prepare(scene, "raster", size=SIZE)
 
 

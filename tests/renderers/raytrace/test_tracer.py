@@ -8,7 +8,7 @@ import pytest
 import shapely
 
 from aliasbench.renderers.catalog import prepare, render
-from aliasbench.scenes.errors import InputError, NotAvailableError
+from aliasbench.scenes.errors import InputError, NotAvailableError, UnsupportedScene
 from aliasbench.scenes.model import Camera, Checker, Grating, ImageTexture, Light, Material, Motion, Scene, read_only
 
 PERSPECTIVE = Camera("perspective", position=(0.0, 0.0, 5.0), fov_y_deg=90.0)
@@ -143,19 +143,19 @@ def test_techniques_not_there_yet_are_refused(triangle_scene: Scene, technique: 
         prepare(triangle_scene, technique, size=(4, 4))
 
 
-def test_scenes_not_there_yet_are_refused(quad: Any, flat_scene: Any) -> None:
+def test_what_a_scene_has_and_the_tracer_does_not_draw_is_named(quad: Any, flat_scene: Any) -> None:
     lens = flat_scene([], camera=Camera("orthographic", height=4.0, lens_radius=0.5))
-    with pytest.raises(NotAvailableError, match=r"camera lens_radius=0.5 is not available"):
+    with pytest.raises(UnsupportedScene, match=r"raytrace: a lens \(lens_radius = 0.5\) is not drawn"):
         prepare(lens, "raytrace:", size=(4, 4))
     corners = ((0.0, 1.0, 0.0), (1.0, 1.0, 0.0), (1.0, 1.0, 1.0), (0.0, 1.0, 1.0))
     lit = dataclasses.replace(flat_scene([]), lights=(Light(corners, (1.0, 1.0, 1.0)),))
-    with pytest.raises(NotAvailableError, match=r"a scene with lights \(1\) is not available"):
+    with pytest.raises(UnsupportedScene, match=r"raytrace: lights \(1\) are not drawn"):
         prepare(lit, "raytrace:", size=(4, 4))
     glass = dataclasses.replace(quad(-1, -1, 1, 1), material=Material("glass"), name="pane")
-    with pytest.raises(NotAvailableError, match=r"material=glass \(object pane\) is not available"):
+    with pytest.raises(UnsupportedScene, match=r"raytrace: material glass \(object pane\) is not drawn"):
         prepare(flat_scene([glass]), "raytrace:", size=(4, 4))
     cut = ImageTexture(read_only(np.ones((2, 2, 4), np.float32)), alpha_cutoff=0.5)
-    with pytest.raises(NotAvailableError, match=r"alpha_cutoff \(texture leaf\) is not available"):
+    with pytest.raises(UnsupportedScene, match=r"raytrace: alpha_cutoff \(texture leaf\) is not drawn"):
         prepare(flat_scene([quad(-1, -1, 1, 1, texture="leaf")], textures={"leaf": cut}), "raytrace:", size=(4, 4))
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from aliasbench.renderers.catalog import render
 from aliasbench.renderers.reference import averaged
-from aliasbench.scenes.errors import NotAvailableError
+from aliasbench.scenes.errors import UnsupportedScene
 from aliasbench.scenes.model import (
     Camera,
     Checker,
@@ -37,7 +37,7 @@ def coarse(monkeypatch):
 def test_materials_that_are_not_there_yet_are_named(make_polygon, make_scene, material):
     triangle = make_polygon(TRIANGLE)
     shiny = Surface(triangle.vertices, triangle.triangles, material=Material(material))
-    with pytest.raises(NotAvailableError, match=rf"material {material} is not available yet; available: unlit"):
+    with pytest.raises(UnsupportedScene, match=rf"material {material} \(object number 0\) is not drawn; unlit"):
         render(make_scene([shiny]), "reference:", size=(4, 4))
 
 
