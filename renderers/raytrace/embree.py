@@ -44,6 +44,8 @@ _SIGNATURES: Mapping[str, tuple[object, tuple[object, ...]]] = {
     "rtcReleaseGeometry": (None, (_POINTER,)),
     "rtcCommitGeometry": (None, (_POINTER,)),
     "rtcAttachGeometry": (_UINT, (_POINTER, _POINTER)),
+    "rtcSetGeometryUserData": (None, (_POINTER, _POINTER)),
+    "rtcSetGeometryEnableFilterFunctionFromArguments": (None, (_POINTER, ctypes.c_bool)),
     "rtcSetNewGeometryBuffer": (
         _POINTER,
         (_POINTER, ctypes.c_int, _UINT, ctypes.c_int, ctypes.c_size_t, ctypes.c_size_t),
@@ -161,12 +163,23 @@ class TriangleScene:
         Vertex indices; m may be 0.
     robust : bool
         Embree's robust mode: no ray slips through an edge that two triangles share.
+    holed : (m,) bool, optional
+        Hits on these triangles go through the filter function of the intersection's arguments.
+    number : int
+        What that function finds as the geometry's user data.
     """
 
     __slots__ = ("__weakref__", "_finalizer", "handle")
 
     def __init__(
-        self, device: Device, vertices: NDArray[np.float32], triangles: NDArray[np.integer], *, robust: bool
+        self,
+        device: Device,
+        vertices: NDArray[np.float32],
+        triangles: NDArray[np.integer],
+        *,
+        robust: bool,
+        holed: NDArray[np.bool_] | None = None,
+        number: int = 0,
     ) -> None:
         library = device.library
         self.handle: int = library.rtcNewScene(device.handle) or 0
@@ -174,17 +187,36 @@ class TriangleScene:
         # The scene keeps its device alive in Embree by a count of its own, so the order of closing does not matter.
         self._finalizer = weakref.finalize(self, library.rtcReleaseScene, self.handle)
         library.rtcSetSceneFlags(self.handle, _SCENE_ROBUST if robust else 0)
-        if len(triangles):
-            geometry = library.rtcNewGeometry(device.handle, _GEOMETRY_TRIANGLE)
-            try:
-                _fill(library, geometry, _BUFFER_VERTEX, _FORMAT_FLOAT3, vertices.astype(np.float32))
-                _fill(library, geometry, _BUFFER_INDEX, _FORMAT_UINT3, triangles.astype(np.uint32))
-                library.rtcCommitGeometry(geometry)
-                library.rtcAttachGeometry(self.handle, geometry)
-            finally:
-                library.rtcReleaseGeometry(geometry)
+        if holed is None or not holed.any():
+            if len(triangles):
+                self._attach(device, vertices, triangles, None)
+        else:
+            # Two geometries, as filters cost time, of all triangles each, as hits give a triangle's place in its own:
+            # what belongs to the other is sent to a vertex that is not a number, and Embree leaves that out.
+            nowhere = np.concatenate([vertices, np.full((1, 3), np.nan, np.float32)])
+            for is_member, user in ((~holed, None), (holed, number)):
+                if is_member.any():
+                    own = np.where(is_member[:, None], triangles, len(vertices))
+                    self._attach(device, nowhere, own, user)
         library.rtcCommitScene(self.handle)
         device.check("build a scene")
+
+    def _attach(
+        self, device: Device, vertices: NDArray[np.float32], triangles: NDArray[np.integer], filtered: int | None
+    ) -> None:
+        """Add triangles; under filters where `filtered`, their user data, is given."""
+        library = device.library
+        geometry = library.rtcNewGeometry(device.handle, _GEOMETRY_TRIANGLE)
+        try:
+            _fill(library, geometry, _BUFFER_VERTEX, _FORMAT_FLOAT3, vertices.astype(np.float32))
+            _fill(library, geometry, _BUFFER_INDEX, _FORMAT_UINT3, triangles.astype(np.uint32))
+            if filtered is not None:
+                library.rtcSetGeometryUserData(geometry, filtered)
+                library.rtcSetGeometryEnableFilterFunctionFromArguments(geometry, True)
+            library.rtcCommitGeometry(geometry)
+            library.rtcAttachGeometry(self.handle, geometry)
+        finally:
+            library.rtcReleaseGeometry(geometry)
 
     def close(self) -> None:
         """Release the scene (again is harmless)."""

@@ -23,6 +23,7 @@ from aliasbench.renderers.raytrace.lanes import (
     HIT_INSTANCE,
     HIT_PRIM,
     LANES,
+    RAY_ID,
     RAY_MASK,
     RAY_SIZE,
     RAY_TFAR,
@@ -40,6 +41,7 @@ from aliasbench.renderers.raytrace.lanes import (
 )
 from aliasbench.renderers.raytrace.shading import MISS, Tables, shade_flat, shade_textured
 from aliasbench.renderers.raytrace.tables import Mesh
+from aliasbench.renderers.raytrace.texturing import CUTOFF
 from aliasbench.scenes.model import FloatArray
 
 IntArray = NDArray[np.int32]
@@ -69,7 +71,7 @@ def _take_next(typing_context: Any, counter: Any) -> Any:  # noqa: ARG001 - numb
 
 
 class Workspace(NamedTuple):
-    """One thread's memory, aligned as Embree needs it."""
+    """One thread's memory, aligned as Embree needs it; `holes` only keeps alive what `arguments` point to."""
 
     scratch: FloatArray
     ray: NDArray[np.float32]
@@ -81,6 +83,7 @@ class Workspace(NamedTuple):
     hits: IntArray
     sums: FloatArray
     keys: KeyArray
+    holes: NDArray[np.int64]
 
 
 def make_workspace(width: int) -> Workspace:
@@ -91,6 +94,7 @@ def make_workspace(width: int) -> Workspace:
     arguments[0], arguments[1] = _COHERENT, _ALL_FEATURES
     for ids in (ray.view(np.int32), body_ray.view(np.int32)):
         ids[RAY_MASK : RAY_MASK + LANES] = -1
+        ids[RAY_ID : RAY_ID + LANES] = np.arange(LANES)
     return Workspace(
         np.zeros(SCRATCH_SIZE),
         ray,
@@ -102,6 +106,7 @@ def make_workspace(width: int) -> Workspace:
         np.zeros(LANES, np.int32),
         np.zeros(3),
         np.zeros((4, width), np.uint64),
+        np.zeros(0, np.int64),
     )
 
 
@@ -243,20 +248,23 @@ class PacketEngine:
         self._threads = threads
         self._pool = ThreadPoolExecutor(max(threads - 1, 1), "aliasbench-rays")
 
-    def _build(self, mesh: Mesh) -> TriangleScene:
-        return TriangleScene(self._device, mesh.vertices.astype(np.float32), mesh.triangles, robust=self._robust)
+    def _build(self, mesh: Mesh, number: int) -> TriangleScene:
+        vertices = mesh.vertices.astype(np.float32)
+        return TriangleScene(
+            self._device, vertices, mesh.triangles, robust=self._robust, holed=mesh.holed, number=number
+        )
 
     def set_still(self, mesh: Mesh) -> None:
         """Take the mesh that stands still (replacing the one before)."""
         if self._still is not None:
             self._still.close()
-        self._still = self._build(mesh)
+        self._still = self._build(mesh, 0)
 
     def set_moving(self, meshes: Sequence[Mesh]) -> None:
         """Take the meshes of the moving bodies, in their own frames."""
         for body in self._bodies:
             body.close()
-        self._bodies = [self._build(mesh) for mesh in meshes]
+        self._bodies = [self._build(mesh, 1 + k) for k, mesh in enumerate(meshes)]
         self._handles = np.array([body.handle for body in self._bodies], np.int64)
 
     def fill(
@@ -273,6 +281,10 @@ class PacketEngine:
             kernel = render_static_textured if textured else render_static_flat
             arguments = (self._still.handle, *shared)
         workspaces = [make_workspace(out.shape[1]) for _ in range(min(self._threads, len(out)))]
+        if len(tables.triangles) and (tables.objects[:, CUTOFF] > -np.inf).any():
+            from aliasbench.renderers.raytrace.cutout_filter import set_holes
+
+            workspaces = [w._replace(holes=set_holes(w.arguments, tables, camera, w.scratch)) for w in workspaces]
         run_kernel(kernel, self._pool, workspaces, arguments, out)
 
     def close(self) -> None:

@@ -2,18 +2,22 @@
 
 Rays and shading are the functions of the packet path; only the tracing differs. embreex traces at time 0 alone, so rays
 go into every moving body's frame, as they do there; here no body is left out because it looks out of sight, which
-makes this the check on that too.
+makes this the check on that too. embreex tells the nearest hit and nothing behind it: where that lies in a hole, the
+same ray is traced against each half of the triangles that may have holes, and so on, down to what it meets first.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from embreex.mesh_construction import TriangleMesh
+from embreex.rtcore import EmbreeDevice
 from embreex.rtcore_scene import EmbreeScene
 from numba import njit
 from numpy.typing import NDArray
 
 from aliasbench.renderers.raytrace.bodies import fill_body_rays, to_body
+from aliasbench.renderers.raytrace.cutouts import find_holes
 from aliasbench.renderers.raytrace.lanes import (
     LANES,
     RAY_DX,
@@ -39,23 +43,102 @@ RayArray = NDArray[np.float32]
 _BATCH = 4096
 
 
+class _Triangles:
+    """Some triangles of a mesh in embreex; `rows` (k,) are their numbers there."""
+
+    __slots__ = ("_device", "_halves", "_mesh", "_robust", "_scene", "rows")
+
+    def __init__(self, device: EmbreeDevice, mesh: Mesh, rows: NDArray[np.int32], *, robust: bool) -> None:
+        self.rows = rows
+        self._device, self._mesh, self._robust = device, mesh, robust
+        self._halves: tuple[_Triangles, ...] = ()
+        self._scene: EmbreeScene | None = None
+        if len(rows):
+            self._scene = EmbreeScene(device, robust=robust)
+            # Only the vertices in use: of a mesh with many holes there are many parts.
+            used, triangles = np.unique(mesh.triangles[rows], return_inverse=True)
+            triangles = triangles.reshape(-1, 3).astype(np.int32)
+            TriangleMesh(self._scene, mesh.vertices[used].astype(np.float32), triangles)
+
+    def trace(self, origins: RayArray, directions: RayArray) -> tuple[RayArray, NDArray[np.int32]]:
+        """Return distances (n,) and triangles of the nearest hits, inf and MISS where there is none."""
+        if self._scene is None or not len(origins):
+            return np.full(len(origins), np.inf, np.float32), np.full(len(origins), MISS, np.int32)
+        found = self._scene.run(origins, directions, output=1)
+        is_hit = found["geomID"] >= 0
+        distances = np.where(is_hit, found["tfar"], np.float32(np.inf))
+        return distances, np.where(is_hit, self.rows[np.where(is_hit, found["primID"], 0)], np.int32(MISS))
+
+    def halves(self) -> tuple["_Triangles", ...]:
+        """Return the first and the second half, none of a single triangle; they are built once."""
+        if not self._halves and len(self.rows) > 1:
+            halves = np.array_split(self.rows, 2)
+            self._halves = tuple(_Triangles(self._device, self._mesh, half, robust=self._robust) for half in halves)
+        return self._halves
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Body:
+    """A mesh's triangles without holes, and those with."""
+
+    solid: _Triangles
+    holed: _Triangles
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Search:
+    """The nearest hits so far: distances and triangles (n,) of all lanes of `scratch`."""
+
+    tables: Tables
+    camera: FloatArray
+    scratch: FloatArray
+    nearest: RayArray
+    hits: NDArray[np.int32]
+
+    def look(self, body: _Body, rays: RayArray, first: int) -> None:
+        """Take nearer hits on a body, whose triangles are numbered from `first` on, by rays in its frame."""
+        origins, directions = _vectors(rays, RAY_OX), _vectors(rays, RAY_DX)
+        distances, found = body.solid.trace(origins, directions)
+        is_nearer = distances < self.nearest
+        self.nearest[is_nearer] = distances[is_nearer]
+        self.hits[is_nearer] = first + found[is_nearer]
+        if len(body.holed.rows):
+            self._look_through(body.holed, origins, directions, first, np.arange(len(origins)))
+
+    def _look_through(
+        self, triangles: _Triangles, origins: RayArray, directions: RayArray, first: int, lanes: NDArray[np.int64]
+    ) -> None:
+        distances, found = triangles.trace(origins[lanes], directions[lanes])
+        is_nearer = distances < self.nearest[lanes]
+        lanes, distances, found = lanes[is_nearer], distances[is_nearer], first + found[is_nearer]
+        holes = np.zeros(len(lanes), np.bool_)
+        find_holes(self.tables, self.camera, found, lanes, self.scratch, holes)
+        self.nearest[lanes[~holes]] = distances[~holes]
+        self.hits[lanes[~holes]] = found[~holes]
+        if holes.any():
+            for half in triangles.halves():
+                self._look_through(half, origins, directions, first, lanes[holes])
+
+
 class PortableEngine:
     """Holds the scene's meshes in embreex and renders pictures ray by ray; see `tracer.Engine`."""
 
-    __slots__ = ("_bodies", "_is_closed", "_robust", "_still")
+    __slots__ = ("_bodies", "_device", "_is_closed", "_robust", "_still")
 
     def __init__(self, *, robust: bool) -> None:
         self._robust = robust
+        self._device = EmbreeDevice()
         self._is_closed = False
-        self._still: EmbreeScene | None = None
-        self._bodies: list[EmbreeScene | None] = []
+        self._still: _Body | None = None
+        self._bodies: list[_Body] = []
 
-    def _build(self, mesh: Mesh) -> EmbreeScene | None:
-        if not len(mesh.triangles):
-            return None
-        scene = EmbreeScene(robust=self._robust)
-        TriangleMesh(scene, mesh.vertices.astype(np.float32), mesh.triangles.astype(np.int32))
-        return scene
+    def _build(self, mesh: Mesh) -> _Body:
+        return _Body(
+            *(
+                _Triangles(self._device, mesh, np.flatnonzero(is_member).astype(np.int32), robust=self._robust)
+                for is_member in (~mesh.holed, mesh.holed)
+            )
+        )
 
     def set_still(self, mesh: Mesh) -> None:
         """Take the mesh that stands still (replacing the one before)."""
@@ -78,28 +161,20 @@ class PortableEngine:
         for top in range(0, out.shape[0], rows):
             blocks = min(rows, out.shape[0] - top) * per_row
             _make_rays(camera, pattern, moving, top, keys, scratch[:blocks], rays[:blocks])
-            hits = self._trace(tables, scratch[:blocks], rays[:blocks])
+            hits = self._trace(tables, camera, scratch[:blocks], rays[:blocks])
             _shade(camera, pattern, tables, top, hits, scratch[:blocks], sums, out)
 
-    def _trace(self, tables: Tables, scratch: FloatArray, rays: RayArray) -> NDArray[np.int32]:
+    def _trace(self, tables: Tables, camera: FloatArray, scratch: FloatArray, rays: RayArray) -> NDArray[np.int32]:
         """Return the triangles hit, (blocks, LANES)."""
         nearest = np.full(rays.shape[0] * LANES, np.inf, np.float32)
         hits = np.full(nearest.shape, MISS, np.int32)
+        search = _Search(tables, camera, scratch, nearest, hits)
         if self._still is not None:
-            self._nearer(self._still, rays, 0, nearest, hits)
+            search.look(self._still, rays, 0)
         for index, body in enumerate(self._bodies):
-            if body is None:
-                continue
             _make_body_rays(tables.bodies[index], scratch, rays)
-            self._nearer(body, rays, int(tables.firsts[index]), nearest, hits)
+            search.look(body, rays, int(tables.firsts[index]))
         return hits.reshape(-1, LANES)
-
-    @staticmethod
-    def _nearer(scene: EmbreeScene, rays: RayArray, first: int, nearest: RayArray, hits: NDArray[np.int32]) -> None:
-        found = scene.run(_vectors(rays, RAY_OX), _vectors(rays, RAY_DX), output=1)
-        is_nearer = (found["geomID"] >= 0) & (found["tfar"] < nearest)
-        nearest[is_nearer] = found["tfar"][is_nearer]
-        hits[is_nearer] = first + found["primID"][is_nearer]
 
     def close(self) -> None:
         """Free everything (again is harmless)."""

@@ -116,7 +116,7 @@ def shade_textured(tables: Tables, camera: FloatArray, hits: NDArray[np.int32], 
         _paint_plain(tables, first, scratch)
         return
     if same and first < tables.firsts[0]:
-        _place_packet(tables, camera, first, scratch)
+        place_packet(tables, camera, first, scratch)
         shade_packet(tables.objects, tables.owners[first], tables.levels, tables.texels, scratch)
         return
     owner = tables.owners[first] if first != MISS else MISS
@@ -128,7 +128,7 @@ def shade_textured(tables: Tables, camera: FloatArray, hits: NDArray[np.int32], 
             if tables.owners[hit] != owner:
                 owner = MISS
             if tables.objects[tables.owners[hit], KIND] != PLAIN:
-                _place_lane(tables, camera, hit, scratch, i)
+                place_lane(tables, camera, hit, scratch, i)
     if owner != MISS and tables.objects[owner, KIND] != PLAIN:
         shade_packet(tables.objects, owner, tables.levels, tables.texels, scratch)
         return
@@ -190,7 +190,25 @@ def _stretch(
 
 
 @njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
-def _place_packet(tables: Tables, camera: FloatArray, hit: int, scratch: FloatArray) -> None:
+def place_along(row: FloatArray, scratch: FloatArray, rays: int) -> None:
+    """Write where 16 rays, in six rows of `scratch` from `rays` on, meet one triangle's plane, as `_place` does."""
+    # Read before the loop: the compiler cannot know that writing coordinates leaves the triangle as it is.
+    nx, ny, nz, offset = row[0], row[1], row[2], row[OFFSET]
+    ax, ay, az, a0 = row[U_MAP], row[U_MAP + 1], row[U_MAP + 2], row[U_SHIFT]
+    bx, by, bz, b0 = row[V_MAP], row[V_MAP + 1], row[V_MAP + 2], row[V_SHIFT]
+    for i in range(LANES):
+        ox, oy, oz = scratch[rays + i], scratch[rays + LANES + i], scratch[rays + 2 * LANES + i]
+        dx, dy = scratch[rays + 3 * LANES + i], scratch[rays + 4 * LANES + i]
+        dz = scratch[rays + 5 * LANES + i]
+        t = (offset - (nx * ox + ny * oy + nz * oz)) / (nx * dx + ny * dy + nz * dz)
+        x, y, z = ox + t * dx, oy + t * dy, oz + t * dz
+        scratch[U + i] = ax * x + ay * y + az * z + a0
+        scratch[V + i] = bx * x + by * y + bz * z + b0
+        scratch[DISTANCE + i] = t
+
+
+@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+def place_packet(tables: Tables, camera: FloatArray, hit: int, scratch: FloatArray) -> None:
     """Write texture coordinates, and levels of detail where needed, of 16 hits on one triangle that stands still.
 
     The level is log2 of the footprint's longer side in texels of level 0 (OpenGL 4.6, 8.14.1). The ray meets the plane
@@ -199,18 +217,7 @@ def _place_packet(tables: Tables, camera: FloatArray, hit: int, scratch: FloatAr
     """
     row = tables.triangles[hit]
     values = tables.objects[tables.owners[hit]]
-    # Read before the loop: the compiler cannot know that writing coordinates leaves the triangle as it is.
-    nx, ny, nz, offset = row[0], row[1], row[2], row[OFFSET]
-    ax, ay, az, a0 = row[U_MAP], row[U_MAP + 1], row[U_MAP + 2], row[U_SHIFT]
-    bx, by, bz, b0 = row[V_MAP], row[V_MAP + 1], row[V_MAP + 2], row[V_SHIFT]
-    for i in range(LANES):
-        ox, oy, oz = scratch[OX + i], scratch[OY + i], scratch[OZ + i]
-        dx, dy, dz = scratch[DX + i], scratch[DY + i], scratch[DZ + i]
-        t = (offset - (nx * ox + ny * oy + nz * oz)) / (nx * dx + ny * dy + nz * dz)
-        x, y, z = ox + t * dx, oy + t * dy, oz + t * dz
-        scratch[U + i] = ax * x + ay * y + az * z + a0
-        scratch[V + i] = bx * x + by * y + bz * z + b0
-        scratch[DISTANCE + i] = t
+    place_along(row, scratch, OX)
     if values[KIND] < MIPMAP:
         return
     step = tables.footprint / camera[SCALE]
@@ -230,8 +237,8 @@ def _place_packet(tables: Tables, camera: FloatArray, hit: int, scratch: FloatAr
 
 
 @njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
-def _place_lane(tables: Tables, camera: FloatArray, hit: int, scratch: FloatArray, i: int) -> None:
-    """Write texture coordinates, and the level of detail where needed, of one hit on anything (see `_place_packet`)."""
+def place_lane(tables: Tables, camera: FloatArray, hit: int, scratch: FloatArray, i: int) -> None:
+    """Write texture coordinates, and the level of detail where needed, of one hit on anything (see `place_packet`)."""
     row = tables.triangles[hit]
     values = tables.objects[tables.owners[hit]]
     ox, oy, oz = scratch[OX + i], scratch[OY + i], scratch[OZ + i]

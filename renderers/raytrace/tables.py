@@ -37,6 +37,7 @@ from aliasbench.renderers.raytrace.shading import (
 from aliasbench.renderers.raytrace.texturing import (
     CHECKER,
     COLOR,
+    CUTOFF,
     KIND,
     LEVEL,
     LEVELS,
@@ -64,20 +65,24 @@ _CHAIN_KIND = {"point": NEAREST, "linear": TRILINEAR, "mipmap": MIPMAP, "triline
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Mesh:
-    """Triangles (m, 3) in one frame of reference, over vertices (n, 3) float64, uv (n, 2); and owners (m,)."""
+    """Triangles (m, 3) in one frame of reference, over vertices (n, 3) float64, uv (n, 2); and owners (m,).
+
+    `holed` (m,) bool says where a ray may pass through a triangle that it hits.
+    """
 
     vertices: FloatArray
     triangles: NDArray[np.int32]
     uv: FloatArray
     owners: NDArray[np.int32]
+    holed: NDArray[np.bool_]
 
 
-def body_mesh(body: Body) -> Mesh:
+def body_mesh(body: Body, looks: "Looks") -> Mesh:
     """Return a body's triangles in the body's own frame."""
-    return Mesh(body.vertices, body.triangles, body.uv, body.surfaces)
+    return Mesh(body.vertices, body.triangles, body.uv, body.surfaces, looks.holed[body.surfaces])
 
 
-def merge_bodies(scene: Scene, bodies: Sequence[Body], shutter: Shutter, anchor: FloatArray) -> Mesh:
+def merge_bodies(scene: Scene, looks: "Looks", bodies: Sequence[Body], shutter: Shutter, anchor: FloatArray) -> Mesh:
     """Return bodies as they stand when the shutter opens, relative to `anchor`, as one mesh."""
     vertices, triangles, count = [np.zeros((0, 3))], [np.zeros((0, 3), np.int32)], 0
     for body in bodies:
@@ -88,11 +93,13 @@ def merge_bodies(scene: Scene, bodies: Sequence[Body], shutter: Shutter, anchor:
         vertices.append(body.vertices @ matrix[:3, :3].T + matrix[:3, 3])
         triangles.append(body.triangles + np.int32(count))
         count += len(body.vertices)
+    owners = np.concatenate([np.zeros(0, np.int32), *(body.surfaces for body in bodies)])
     return Mesh(
         np.concatenate(vertices),
         np.concatenate(triangles),
         np.concatenate([np.zeros((0, 2)), *(body.uv for body in bodies)]),
-        np.concatenate([np.zeros(0, np.int32), *(body.surfaces for body in bodies)]),
+        owners,
+        looks.holed[owners],
     )
 
 
@@ -138,12 +145,13 @@ def triangle_values(mesh: Mesh) -> FloatArray:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Looks:
-    """What does not change from frame to frame: the objects' values and all mip levels."""
+    """What does not change from frame to frame: the objects' values, which have holes, and all mip levels."""
 
     objects: FloatArray
     levels: NDArray[np.int64]
     texels: NDArray[np.float32]
     textured: bool
+    holed: NDArray[np.bool_]
 
 
 def build_looks(scene: Scene, mode: str) -> Looks:
@@ -156,6 +164,7 @@ def build_looks(scene: Scene, mode: str) -> Looks:
     for values, surface in zip(objects, scene.objects, strict=False):
         values[COLOR : COLOR + 3] = surface.color
         values[KIND] = PLAIN
+        values[CUTOFF] = -np.inf
         if surface.texture is None:
             continue
         texture = scene.textures[surface.texture]
@@ -174,11 +183,16 @@ def build_looks(scene: Scene, mode: str) -> Looks:
         if mode == "linear":
             values[KIND], values[LEVELS] = TRILINEAR, 1
         values[UV_MATRIX : UV_MATRIX + 6] = chain.uv_matrix.ravel()
+        if isinstance(texture, ImageTexture) and texture.alpha_cutoff is not None:
+            # In single precision, as alpha is stored; no average of alphas that all reach it falls below.
+            cutoff = np.float32(texture.alpha_cutoff)
+            values[CUTOFF] = cutoff if chain.levels[0][..., 3].min() < cutoff else -np.inf
     return Looks(
         objects,
         np.array(levels, np.int64).reshape(-1, 3),
         np.concatenate(texels),
         bool((objects[:, KIND] != PLAIN).any()),
+        (objects[:, KIND] != PLAIN) & (objects[:, CUTOFF] > -np.inf),
     )
 
 

@@ -11,8 +11,8 @@ from aliasbench.renderers.raytrace.lanes import BLUE, GREEN, LANES, LOD, RED, U,
 from aliasbench.renderers.raytrace.trig import cos_turns
 from aliasbench.scenes.model import FloatArray
 
-# Values of an object: colour, kind of texture, and what that kind needs.
-COLOR, KIND, PLACE, LOW, SPAN, PHASE, RATE, LEVEL, LEVELS, UV_MATRIX, OBJECT_SIZE = (
+# Values of an object: colour, kind of texture, what that kind needs, and below which alpha it is absent (-inf: none).
+COLOR, KIND, PLACE, LOW, SPAN, PHASE, RATE, LEVEL, LEVELS, UV_MATRIX, CUTOFF, OBJECT_SIZE = (
     0,
     3,
     4,
@@ -24,6 +24,7 @@ COLOR, KIND, PLACE, LOW, SPAN, PHASE, RATE, LEVEL, LEVELS, UV_MATRIX, OBJECT_SIZ
     15,
     16,
     22,
+    23,
 )
 PLAIN, CHECKER, SINE, SQUARE, ZONE = 0.0, 1.0, 2.0, 3.0, 4.0
 NEAREST, MIPMAP, TRILINEAR = 5.0, 6.0, 7.0
@@ -126,26 +127,45 @@ def shade_lane(
 
 
 @njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
-def _look_up(values: FloatArray, levels: IndexArray, texels: TexelArray, scratch: FloatArray, i: int) -> None:
-    """Write the colour of an image (or baked chain) from one level or between two."""
-    kind, first = values[KIND], int(values[LEVEL])
+def _own_place(values: FloatArray, scratch: FloatArray, i: int) -> tuple[float, float]:
+    """Return where a lane's texture coordinates lie in those of the mip chain."""
     u, v = scratch[U + i], scratch[V + i]
-    s = values[UV_MATRIX] * u + values[UV_MATRIX + 1] * v + values[UV_MATRIX + 2]
-    r = values[UV_MATRIX + 3] * u + values[UV_MATRIX + 4] * v + values[UV_MATRIX + 5]
-    if kind == NEAREST:
-        width, height = levels[first, 1], levels[first, 2]
-        at = levels[first, 0] + _wrap(np.floor(r * height), height) * width + _wrap(np.floor(s * width), width)
-        for k in range(3):
-            scratch[RED + k * LANES + i] = values[COLOR + k] * texels[at, k]
-        return
+    return (
+        values[UV_MATRIX] * u + values[UV_MATRIX + 1] * v + values[UV_MATRIX + 2],
+        values[UV_MATRIX + 3] * u + values[UV_MATRIX + 4] * v + values[UV_MATRIX + 5],
+    )
+
+
+@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+def _nearest(first: int, width: int, height: int, s: float, r: float) -> int:
+    """Return the texel that holds a place, on the level that has its first texel there and this size."""
+    return first + _wrap(np.floor(r * height), height) * width + _wrap(np.floor(s * width), width)
+
+
+@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+def _level_of(values: FloatArray, scratch: FloatArray, i: int) -> tuple[int, float]:
+    """Return the level that a lane is looked up in, and the share of the one above."""
     lod = min(max(scratch[LOD + i], 0.0), values[LEVELS] - 1.0)
-    if kind == MIPMAP:
+    if values[KIND] == MIPMAP:
         # GL's rule for the nearest level: ceil(lod + 1/2) - 1.
         level, part = max(np.ceil(lod + 0.5) - 1.0, 0.0), 0.0
     else:
         level = np.floor(lod)
         part = lod - level
-    at = first + int(level)
+    return int(values[LEVEL]) + int(level), part
+
+
+@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+def _look_up(values: FloatArray, levels: IndexArray, texels: TexelArray, scratch: FloatArray, i: int) -> None:
+    """Write the colour of an image (or baked chain) from one level or between two."""
+    s, r = _own_place(values, scratch, i)
+    if values[KIND] == NEAREST:
+        level = levels[int(values[LEVEL])]
+        texel = _nearest(level[0], level[1], level[2], s, r)
+        for k in range(3):
+            scratch[RED + k * LANES + i] = values[COLOR + k] * texels[texel, k]
+        return
+    at, part = _level_of(values, scratch, i)
     red, green, blue = _bilinear(levels, texels, at, s, r)
     if part > 0.0:
         red_above, green_above, blue_above = _bilinear(levels, texels, at + 1, s, r)
@@ -158,7 +178,42 @@ def _look_up(values: FloatArray, levels: IndexArray, texels: TexelArray, scratch
 
 
 @njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
-def _bilinear(levels: IndexArray, texels: TexelArray, level: int, s: float, r: float) -> tuple[float, float, float]:
+def alpha_packet(values: FloatArray, levels: IndexArray, texels: TexelArray, scratch: FloatArray) -> None:
+    """Write the alpha of 16 hits on one image where their red goes."""
+    if values[KIND] == NEAREST:
+        # Read before the loop: the compiler cannot know that writing alphas leaves them as they are.
+        level = levels[int(values[LEVEL])]
+        first, width, height = level[0], level[1], level[2]
+        a, b, c = values[UV_MATRIX], values[UV_MATRIX + 1], values[UV_MATRIX + 2]
+        d, e, f = values[UV_MATRIX + 3], values[UV_MATRIX + 4], values[UV_MATRIX + 5]
+        for i in range(LANES):
+            u, v = scratch[U + i], scratch[V + i]
+            texel = _nearest(first, width, height, a * u + b * v + c, d * u + e * v + f)
+            scratch[RED + i] = texels[texel, 3]
+        return
+    for i in range(LANES):
+        scratch[RED + i] = alpha_lane(values, levels, texels, scratch, i)
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def alpha_lane(values: FloatArray, levels: IndexArray, texels: TexelArray, scratch: FloatArray, i: int) -> float:
+    """Return the alpha of an image at a hit, looked up as `_look_up` does the colour."""
+    s, r = _own_place(values, scratch, i)
+    if values[KIND] == NEAREST:
+        level = levels[int(values[LEVEL])]
+        return texels[_nearest(level[0], level[1], level[2], s, r), 3]
+    at, part = _level_of(values, scratch, i)
+    alpha = _bilinear_alpha(levels, texels, at, s, r)
+    if part > 0.0:
+        alpha += part * (_bilinear_alpha(levels, texels, at + 1, s, r) - alpha)
+    return alpha
+
+
+@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+def _four_texels(
+    levels: IndexArray, level: int, s: float, r: float
+) -> tuple[int, int, int, int, float, float, float, float]:
+    """Return the texels about a place (left and right of the lower row, then of the upper) and their weights."""
     first, width, height = levels[level, 0], levels[level, 1], levels[level, 2]
     x, y = s * width - 0.5, r * height - 0.5
     x0, y0 = np.floor(x), np.floor(y)
@@ -167,12 +222,26 @@ def _bilinear(levels: IndexArray, texels: TexelArray, level: int, s: float, r: f
     right = left + 1 if left + 1 < width else 0
     high = low + 1 if low + 1 < height else 0
     p, q = first + low * width, first + high * width
-    w00, w10, w01, w11 = (1.0 - a) * (1.0 - b), a * (1.0 - b), (1.0 - a) * b, a * b
     return (
-        w00 * texels[p + left, 0] + w10 * texels[p + right, 0] + w01 * texels[q + left, 0] + w11 * texels[q + right, 0],
-        w00 * texels[p + left, 1] + w10 * texels[p + right, 1] + w01 * texels[q + left, 1] + w11 * texels[q + right, 1],
-        w00 * texels[p + left, 2] + w10 * texels[p + right, 2] + w01 * texels[q + left, 2] + w11 * texels[q + right, 2],
+        p + left, p + right, q + left, q + right,
+        (1.0 - a) * (1.0 - b), a * (1.0 - b), (1.0 - a) * b, a * b,
+    )  # fmt: skip
+
+
+@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+def _bilinear(levels: IndexArray, texels: TexelArray, level: int, s: float, r: float) -> tuple[float, float, float]:
+    c00, c10, c01, c11, w00, w10, w01, w11 = _four_texels(levels, level, s, r)
+    return (
+        w00 * texels[c00, 0] + w10 * texels[c10, 0] + w01 * texels[c01, 0] + w11 * texels[c11, 0],
+        w00 * texels[c00, 1] + w10 * texels[c10, 1] + w01 * texels[c01, 1] + w11 * texels[c11, 1],
+        w00 * texels[c00, 2] + w10 * texels[c10, 2] + w01 * texels[c01, 2] + w11 * texels[c11, 2],
     )
+
+
+@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+def _bilinear_alpha(levels: IndexArray, texels: TexelArray, level: int, s: float, r: float) -> float:
+    c00, c10, c01, c11, w00, w10, w01, w11 = _four_texels(levels, level, s, r)
+    return w00 * texels[c00, 3] + w10 * texels[c10, 3] + w01 * texels[c01, 3] + w11 * texels[c11, 3]
 
 
 @njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)

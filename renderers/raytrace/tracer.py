@@ -32,8 +32,8 @@ from aliasbench.renderers.sampling.hashing import frame_key
 from aliasbench.renderers.sampling.patterns import pattern_frame, sampler_code
 from aliasbench.renderers.technique import Technique
 from aliasbench.renderers.unlit import check_unlit
-from aliasbench.scenes.errors import InputError, NotAvailableError, UnsupportedScene
-from aliasbench.scenes.model import FloatArray, ImageTexture, Scene
+from aliasbench.scenes.errors import InputError, NotAvailableError
+from aliasbench.scenes.model import FloatArray, Scene
 
 THREADS_VARIABLE = "ALIASBENCH_THREADS"
 _MAX_THREADS = 1024
@@ -92,12 +92,6 @@ def check_available(scene: Scene, technique: Technique) -> None:
         if is_refused:
             raise NotAvailableError(f"{asked} is not available in the ray tracer yet; available: {instead}")
     check_unlit("raytrace", scene)
-    for surface in scene.objects:
-        texture = scene.textures[surface.texture] if surface.texture is not None else None
-        if isinstance(texture, ImageTexture) and texture.alpha_cutoff is not None:
-            raise UnsupportedScene(
-                f"raytrace: alpha_cutoff (texture {surface.texture}) is not drawn; images without it are"
-            )
 
 
 def prepare_raytrace(scene: Scene, technique: Technique, size: tuple[int, int]) -> "PreparedRaytrace":
@@ -160,7 +154,7 @@ class PreparedRaytrace:
         self._mesh_key: tuple[int, ...] = ()
         self._still = self._moving = build_ownership((), textured=False)
         exposure = plan_exposure(scene, technique, size, self._bodies, 0)
-        meshes = [body_mesh(body) for body in exposure.moving]
+        meshes = [body_mesh(body, self._looks) for body in exposure.moving]
         engine.set_moving(meshes)
         self._moving = build_ownership(meshes, textured=self._looks.textured)
         self._place(exposure)
@@ -183,7 +177,7 @@ class PreparedRaytrace:
         """Give the engine the still mesh of an exposure, unless it has it."""
         if exposure.mesh_key == self._mesh_key:
             return
-        mesh = merge_bodies(self._scene, exposure.still, exposure.shutter, exposure.anchor)
+        mesh = merge_bodies(self._scene, self._looks, exposure.still, exposure.shutter, exposure.anchor)
         self._engine.set_still(mesh)
         self._still = build_ownership((mesh,), textured=self._looks.textured)
         self._mesh_key = exposure.mesh_key

@@ -9,7 +9,7 @@ import shapely
 
 from aliasbench.renderers.catalog import prepare, render
 from aliasbench.scenes.errors import InputError, NotAvailableError, UnsupportedScene
-from aliasbench.scenes.model import Camera, Checker, Grating, ImageTexture, Light, Material, Motion, Scene, read_only
+from aliasbench.scenes.model import Camera, Checker, Grating, Light, Material, Motion, Scene
 
 PERSPECTIVE = Camera("perspective", position=(0.0, 0.0, 5.0), fov_y_deg=90.0)
 SLANTED = Camera("perspective", position=(3.0, 2.0, 5.0), fov_y_deg=60.0)
@@ -154,9 +154,6 @@ def test_what_a_scene_has_and_the_tracer_does_not_draw_is_named(quad: Any, flat_
     glass = dataclasses.replace(quad(-1, -1, 1, 1), material=Material("glass"), name="pane")
     with pytest.raises(UnsupportedScene, match=r"raytrace: material glass \(object pane\) is not drawn"):
         prepare(flat_scene([glass]), "raytrace:", size=(4, 4))
-    cut = ImageTexture(read_only(np.ones((2, 2, 4), np.float32)), alpha_cutoff=0.5)
-    with pytest.raises(UnsupportedScene, match=r"raytrace: alpha_cutoff \(texture leaf\) is not drawn"):
-        prepare(flat_scene([quad(-1, -1, 1, 1, texture="leaf")], textures={"leaf": cut}), "raytrace:", size=(4, 4))
 
 
 def test_diffuse_without_lights_equals_unlit(quad: Any, flat_scene: Any) -> None:
