@@ -30,9 +30,14 @@ COMMANDS = {
     "compare": "what changed between two runs (not available yet)",
     "history": "how results changed over many runs (not available yet)",
     "merge": "the shards of a run as one (not available yet)",
-    "scenes": "export, check and overview of scenes (not available yet)",
+    "scenes": "scene files: export one to start from, check yours, a contact sheet of all",
 }
-NOT_YET = ("compare", "history", "merge", "scenes")
+NOT_YET = ("compare", "history", "merge")
+SCENE_ACTIONS = {
+    "export": "a scene as a scene file (TOML) that loads as an equal scene",
+    "check": "all that is wrong with scene files, with lines; or what they hold and who can draw them",
+    "sheet": "every scene, point sampled beside its reference, as pictures and a page",
+}
 EXECUTORS = ("local", "dask")
 
 
@@ -73,12 +78,19 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         raise InputError(f"no command given; known: {', '.join(COMMANDS)} (see aliasbench --help)")
     if words and words[0] not in COMMANDS:
         raise unknown_name("command", shortened(words[0]), COMMANDS)
+    if words and words[0] == "scenes" and not wants_help:
+        known_actions = ", ".join(SCENE_ACTIONS)
+        if len(words) < 2:
+            raise InputError(f"scenes: no action given; known: {known_actions} (see aliasbench scenes --help)")
+        if words[1] not in SCENE_ACTIONS:
+            raise unknown_name("action of scenes", shortened(words[1]), SCENE_ACTIONS)
     if words and words[0] in NOT_YET and not wants_help:
         there = ", ".join(name for name in COMMANDS if name not in NOT_YET)
         raise NotAvailableError(f"the command {words[0]} is not available yet; available: {there}")
     known, left_over = parser.parse_known_args(arguments)
     if left_over:
-        raise _unexpected(left_over[0], commands[known.command])
+        action = getattr(known, "action", None)
+        raise _unexpected(left_over[0], commands[f"{known.command} {action}" if action else known.command])
     return known
 
 
@@ -121,6 +133,7 @@ def _build() -> tuple[Parser, dict[str, Parser]]:
     _add_json(commands["doctor"])
     section = commands["list"]
     section.add_argument("section", nargs="?", metavar="SECTION", help="only this one")
+    section.add_argument("name", nargs="?", metavar="NAME", help="all there is to know of this one")
     _add_json(section)
     _add_render(commands["render"])
     _add_run(commands["run"])
@@ -133,7 +146,7 @@ def _build() -> tuple[Parser, dict[str, Parser]]:
     export.add_argument("--format", default="json", metavar="FORMAT", help="json")
     export.add_argument("--json", dest="format", action="store_const", const="json", help="the same as --format json")
     export.add_argument("-o", "--output", type=Path, metavar="FILE", help="default: standard output")
-    return parser, commands
+    return parser, commands | _add_scenes(commands["scenes"])
 
 
 def _add_json(parser: argparse.ArgumentParser) -> None:
@@ -148,6 +161,26 @@ def _add_render(render: argparse.ArgumentParser) -> None:
     render.add_argument("--frame", type=_read(whole(0)), default=0, metavar="N", help="frame number, default 0")
     render.add_argument("--seed", type=_read(whole(0)), default=0, metavar="N", help="default 0")
     _add_json(render)
+
+
+def _add_scenes(scenes: argparse.ArgumentParser) -> dict[str, Parser]:
+    found = scenes.add_subparsers(dest="action", metavar="ACTION", parser_class=Parser)
+    actions = {
+        name: found.add_parser(name, help=summary, description=summary, allow_abbrev=False)
+        for name, summary in SCENE_ACTIONS.items()
+    }
+    export, check, sheet = actions["export"], actions["check"], actions["sheet"]
+    export.add_argument("scene", metavar="SCENE", help="a scene's name, as in propeller:blades=5, or a file")
+    out = "a folder, or a path ending in .toml; images go beside the file (default: all to standard output)"
+    export.add_argument("-o", "--output", type=Path, metavar="DIR", help=out)
+    check.add_argument("files", nargs="+", type=Path, metavar="FILE", help="scene files, or models")
+    sheet.add_argument("scene", nargs="*", metavar="SCENE", help="names or files; default: the whole catalog")
+    sheet.add_argument("-o", "--output", type=Path, required=True, metavar="DIR", help="where the pictures go")
+    sheet.add_argument("--size", type=_read(read_size), default=(256, 256), metavar="WxH", help="default 256x256")
+    sheet.add_argument("--frame", type=_read(whole(0)), default=0, metavar="N", help="frame number, default 0")
+    for action in actions.values():
+        _add_json(action)
+    return {f"scenes {name}": action for name, action in actions.items()}
 
 
 def _add_run(run: argparse.ArgumentParser) -> None:

@@ -10,8 +10,7 @@ import json
 import shlex
 import sqlite3
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -22,7 +21,6 @@ from aliasbench.scenes.errors import InputError, UnsupportedScene, unknown_name
 
 if TYPE_CHECKING:
     from aliasbench.bench.export import Run
-    from aliasbench.bench.run import Step
 
 OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 NOWHERE = "cannot print: standard output is closed"
@@ -62,6 +60,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _say(text: str) -> None:
     with writing_output():
         print(text)
+
+
+def _tell(line: str) -> None:
+    print(line, file=sys.stderr, flush=True)
 
 
 def _complain(text: str, code: int) -> int:
@@ -111,14 +113,24 @@ def _list(options: argparse.Namespace) -> int:
         raise unknown_name("section", options.section, SECTIONS)
     chosen = [options.section] if options.section else list(SECTIONS)
     rows = {section: SECTIONS[section]() for section in chosen}
+    if options.name is not None:
+        by_name = {str(row["name"]): row for row in rows[options.section]}
+        if options.name not in by_name:
+            raise unknown_name(f"name of {options.section}", options.name, by_name)
+        rows = {options.section: [by_name[options.name]]}
     if options.json:
         _print_json(rows)
     else:
-        _say("\n\n".join("\n".join(describe(section, found)) for section, found in rows.items()))
+        _say(
+            "\n\n".join(
+                "\n".join(describe(section, found, whole=options.name is not None)) for section, found in rows.items()
+            )
+        )
     return OK
 
 
 def _render(options: argparse.Namespace) -> int:
+    from aliasbench.bench.display import waiting
     from aliasbench.bench.frames import check_output, write_image
     from aliasbench.renderers import catalog
     from aliasbench.scenes.files import load_scene
@@ -126,7 +138,7 @@ def _render(options: argparse.Namespace) -> int:
     check_output(options.output)
     technique = catalog.resolve_technique(options.technique)
     scene = load_scene(options.scene)
-    with _waiting(f"{scene.name} by {technique.text}"):
+    with waiting(f"{scene.name} by {technique.text}"):
         frame = catalog.render(scene, technique, size=options.size, frame=options.frame, seed=options.seed)
     write_image(options.output, frame.pixels)
     facts = {
@@ -151,6 +163,7 @@ def _render(options: argparse.Namespace) -> int:
 
 
 def _run(options: argparse.Namespace) -> int:
+    from aliasbench.bench.display import progress
     from aliasbench.bench.export import load_run
     from aliasbench.bench.run import start_run
     from aliasbench.bench.suite import Request
@@ -168,7 +181,7 @@ def _run(options: argparse.Namespace) -> int:
         options.shard,
     )
     try:
-        with _progress() as on_step:
+        with progress(_tell) as on_step:
             start_run(request, options.output, resume=options.resume, fresh=options.fresh, on_step=on_step)
     except KeyboardInterrupt:
         again = f"aliasbench run -o {shlex.quote(str(options.output))} --resume"
@@ -195,54 +208,6 @@ def _print_table(run: "Run", run_dir: Path) -> None:
     total = ", ".join(f"{count} {status}" for status, count in counts.items())
     lines = [*legend_lines(run, console.width), *failure_lines(run), f"{printable(str(run_dir))}: {total}"]
     _say(tables.get() + "\n".join(lines))
-
-
-@contextmanager
-def _waiting(what: str) -> Iterator[None]:
-    """Show on a terminal what goes on, and for how long."""
-    if not sys.stderr.isatty():
-        yield
-        return
-    from rich.console import Console
-    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
-
-    columns = (SpinnerColumn(), TimeElapsedColumn(), TextColumn("{task.description}", markup=False))
-    with Progress(*columns, console=Console(stderr=True), transient=True) as spinner:
-        spinner.add_task(printable(what), total=None)
-        yield
-
-
-@contextmanager
-def _progress() -> "Iterator[Callable[[Step], None]]":
-    """Yield a listener that shows how far the run is: a bar with the time left, or a line for each thing begun."""
-    from aliasbench.bench.progress import ProgressLog
-
-    log = ProgressLog()
-
-    def say(step: "Step") -> None:
-        line = log.line(step)
-        if line is not None:
-            print(line, file=sys.stderr, flush=True)
-
-    if not sys.stderr.isatty():
-        yield say
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
-
-    columns = (BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(), TextColumn("{task.description}", markup=False))
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        tasks: list[TaskID] = []
-
-        def show(step: "Step") -> None:
-            if step.total == 0:
-                bar.console.print(printable(step.doing), markup=False, highlight=False)
-                return
-            if not tasks:
-                tasks.append(bar.add_task("", total=step.total))
-            bar.update(tasks[0], completed=step.done, total=step.total, description=printable(step.doing))
-
-        yield show
 
 
 def _report(options: argparse.Namespace) -> int:
@@ -272,6 +237,54 @@ def _export(options: argparse.Namespace) -> int:
     return OK
 
 
+def _scenes(options: argparse.Namespace) -> int:
+    return {"export": _scenes_export, "check": _scenes_check, "sheet": _scenes_sheet}[options.action](options)
+
+
+def _scenes_export(options: argparse.Namespace) -> int:
+    from aliasbench.bench.scene_files import export_files, export_text
+
+    if options.output is None:
+        text = export_text(options.scene)
+        _print_json({"scene": options.scene, "text": text}) if options.json else _say(text.removesuffix("\n"))
+        return OK
+    paths = [str(path) for path in export_files(options.scene, options.output)]
+    _print_json({"scene": options.scene, "files": paths}) if options.json else _say("\n".join(map(printable, paths)))
+    return OK
+
+
+def _scenes_check(options: argparse.Namespace) -> int:
+    from aliasbench.bench.scene_files import check_files, checked_lines, checked_row
+
+    checked, unreadable = check_files(options.files)
+    wrong = [c for c in checked if c.scene is None]
+    if options.json:
+        _print_json({"files": [checked_row(c) for c in checked], "unreadable": unreadable})
+    elif checked:
+        _say("\n".join(printable(line) for c in checked for line in checked_lines(c)))
+    if not wrong and not unreadable:
+        return OK
+    found = ", ".join(f"{len(c.findings)} in {c.file}" for c in wrong)
+    return _complain("; ".join([*unreadable, *([f"problems: {found}"] if found else [])]), BAD_INPUT)
+
+
+def _scenes_sheet(options: argparse.Namespace) -> int:
+    from aliasbench.bench.sheet import make_sheet
+
+    sheet = make_sheet(
+        options.scene,
+        options.output,
+        size=options.size,
+        frame=options.frame,
+        on_step=lambda line: _tell(printable(line)),
+    )
+    if options.json:
+        _print_json(sheet.as_data())
+    else:
+        _say("\n".join(printable(str(path)) for path in (sheet.index, sheet.overview, *sheet.images)))
+    return OK
+
+
 _COMMANDS: Mapping[str, Callable[[argparse.Namespace], int]] = {
     "doctor": _doctor,
     "list": _list,
@@ -279,4 +292,5 @@ _COMMANDS: Mapping[str, Callable[[argparse.Namespace], int]] = {
     "run": _run,
     "report": _report,
     "export": _export,
+    "scenes": _scenes,
 }

@@ -71,14 +71,16 @@ def _plain(parameter: object) -> object:
     return parameter
 
 
-def describe(section: str, rows: Rows) -> list[str]:
-    """Return a section as lines for people, scenes with their parameters."""
+def describe(section: str, rows: Rows, *, whole: bool = False) -> list[str]:
+    """Return a section as lines for people, one for each name; with `whole`, scenes with their parameters."""
     width = max((len(str(row["name"])) for row in rows), default=0)
     lines = [f"{section}:"]
     for row in rows:
         lines.append(f"  {row['name']!s:<{width}}  {row['summary']}".rstrip())
         parameters = row.get("parameters")
-        for name, p in parameters.items() if isinstance(parameters, dict) else ():
-            allowed = " or ".join(p["names"]) if "names" in p else f"{p['low']} to {p['high']}"
-            lines.append(f"  {'':<{width}}    {name}={p['default']}: {p['meaning']} ({allowed})")
+        for name, p in parameters.items() if whole and isinstance(parameters, dict) else ():
+            allowed = " or ".join(p["names"]) if "names" in p else f"{p['low']:.10g} to {p['high']:.10g}"
+            lines.append(f"    {name}={p['default']}: {p['meaning']} ({allowed})")
+    if section == "scenes" and not whole:
+        lines.append("  (parameters: aliasbench list scenes NAME)")
     return lines

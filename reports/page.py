@@ -23,6 +23,7 @@ from aliasbench.reports import charts, tables
 from aliasbench.reports.figures import HEAT_HIGH, HEAT_LOW, heat_palette
 from aliasbench.reports.gallery import Gallery, make_galleries
 from aliasbench.reports.records import Record, Run, load_runs
+from aliasbench.reports.signal_figures import SignalFigure, draw_records
 from aliasbench.scenes.errors import InputError
 
 MAIN_FACTS = ("cpu", "cores", "memory", "os", "python", "aliasbench", "opengl", "embree")
@@ -58,6 +59,7 @@ class SceneSection:
     at_floor: Sequence[str]
     absent: Sequence[str]
     table: tables.Table
+    signals: Sequence[SignalFigure]
 
 
 def write_report(run_dirs: Sequence[Path], out: Path) -> Path:
@@ -171,6 +173,7 @@ def _scene_section(
         at_floor=[charts.describe(p) for p in points if p.reason],
         absent=[_absence(r) for r in group if id(r) not in drawn],
         table=tables.scene_table(group, runs),
+        signals=draw_records(group),
     )
 
 

@@ -8,7 +8,28 @@ import re
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from aliasbench.scenes import confetti, edges, floors, propeller
+from aliasbench.scenes import (
+    camera_turn,
+    checker_floor,
+    colour_bleeding,
+    confetti,
+    depth_of_field,
+    dispersion_prism,
+    distant_triangle,
+    edges,
+    floors,
+    glossy_floor,
+    grid,
+    lantern,
+    propeller,
+    signals,
+    slivers,
+    soft_shadow,
+    two_matrices,
+    walls,
+    window_screens,
+    zone_plate,
+)
 from aliasbench.scenes.entries import Parameter, SceneEntry, Value
 from aliasbench.scenes.errors import InputError, shortened, unknown_name
 from aliasbench.scenes.model import Scene
@@ -19,10 +40,26 @@ SCENES: Mapping[str, SceneEntry] = MappingProxyType(
     {
         entry.name: entry
         for entry in (
-            *edges.ENTRIES,
-            *confetti.ENTRIES,
-            *propeller.ENTRIES,
             *floors.ENTRIES,
+            *walls.ENTRIES,
+            *checker_floor.ENTRIES,
+            *distant_triangle.ENTRIES,
+            *confetti.ENTRIES,
+            *slivers.ENTRIES,
+            *edges.ENTRIES,
+            *grid.ENTRIES,
+            *zone_plate.ENTRIES,
+            *window_screens.ENTRIES,
+            *propeller.ENTRIES,
+            *signals.ENTRIES,
+            *camera_turn.ENTRIES,
+            *two_matrices.ENTRIES,
+            *soft_shadow.ENTRIES,
+            *depth_of_field.ENTRIES,
+            *glossy_floor.ENTRIES,
+            *dispersion_prism.ENTRIES,
+            *colour_bleeding.ENTRIES,
+            *lantern.ENTRIES,
         )
     }
 )

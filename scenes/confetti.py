@@ -41,7 +41,7 @@ COLORS: tuple[Vec3, ...] = (
 )
 
 
-def build_confetti(*, name: str, count: int, size_px: float, seed: int, speed: float) -> Scene:
+def build_confetti(*, name: str, count: int, size_px: float, seed: int, speed: float, shutter: float) -> Scene:
     """Return `count` triangles in every square of the picture's height, drifting to the right with `speed`."""
     in_cell = max(1, round(count * PERIOD * ACROSS / 4.0))
     cell, color = _cell(in_cell, 2 * size_px / 256, seed)
@@ -66,7 +66,7 @@ def build_confetti(*, name: str, count: int, size_px: float, seed: int, speed: f
         name=name,
         camera=flat_camera(),
         objects=tuple(objects),
-        animation=Animation(fps=float(FPS), frames=loop_frames(loops_per_s) if speed else 1),
+        animation=Animation(fps=float(FPS), frames=loop_frames(loops_per_s) if speed else 1, shutter=shutter),
         facts=Facts(pans=(PanFact(velocity, 1.0 / loops_per_s),) if speed else ()),
     )
 
@@ -114,6 +114,7 @@ ENTRIES = (
             "size_px": Parameter(1.5, 0.2, 20.0, "float", "largest diameter, in pixels of a picture 256 high"),
             "seed": Parameter(1, 0, 2**31 - 1, "int", "of places, shapes and colours"),
             "speed": Parameter(0.08, -2.0, 2.0, "float", "drift to the right and up, world units per second"),
+            "shutter": Parameter(0.0, 0.0, 1.0, "float", "open share of the frame interval"),
         },
     ),
 )

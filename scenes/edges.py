@@ -17,7 +17,7 @@ from aliasbench.scenes.entries import Parameter, SceneEntry
 from aliasbench.scenes.errors import InputError
 from aliasbench.scenes.model import Animation, EdgeFact, Facts, Motion, Scene, Spin, Surface, Vec3
 from aliasbench.scenes.shapes import polygon, quad
-from aliasbench.scenes.staging import FPS, LEAST_FRAMES, flat_camera, polar
+from aliasbench.scenes.staging import FPS, LEAST_FRAMES, flat_camera, loop_frames, polar
 
 REACH = 16.0  # world units from the middle to where the shapes end; the picture is 2 high
 # At 18 wedges thick ones stand every 40 degrees and are 14.5 wide: modulo 90 their edges lie at 1.7, 6.2, 11.7, 16.2
@@ -28,7 +28,7 @@ MEASURED = (0.45, 0.9)  # radii between which the fan's edges are declared
 THIN_COLORS: tuple[Vec3, ...] = ((1.0, 0.5, 0.0), (0.0, 0.8, 1.0), (1.0, 0.2, 0.8), (0.6, 1.0, 0.1))
 
 
-def build_near_horizontal_edge(*, name: str, slope: float, offset: float, speed: float) -> Scene:
+def build_near_horizontal_edge(*, name: str, slope: float, offset: float, speed: float, shutter: float) -> Scene:
     """Return a white half plane above an edge of the given slope (dy/dx) through (0, offset); `speed` moves it up."""
     along = np.array([1.0, slope, 0.0]) / math.hypot(1.0, slope)
     across = np.array([-along[1], along[0], 0.0])
@@ -43,12 +43,12 @@ def build_near_horizontal_edge(*, name: str, slope: float, offset: float, speed:
         name=name,
         camera=flat_camera(),
         objects=(plane,),
-        animation=Animation(fps=float(FPS), frames=LEAST_FRAMES if speed else 1),
+        animation=Animation(fps=float(FPS), frames=LEAST_FRAMES if speed else 1, shutter=shutter),
         facts=Facts(edges=(EdgeFact(_vec3(start), _vec3(end)),)),
     )
 
 
-def build_edge_fan(*, name: str, wedges: int, rev_per_s: float) -> Scene:
+def build_edge_fan(*, name: str, wedges: int, rev_per_s: float, shutter: float) -> Scene:
     """Return `wedges` (even) wedges from the middle outwards, thick and thin in turn, turning at `rev_per_s`."""
     if wedges % 2:
         raise InputError(f"scene 'edge-fan': parameter wedges = {wedges}: must be even (thick and thin in turn)")
@@ -78,7 +78,7 @@ def build_edge_fan(*, name: str, wedges: int, rev_per_s: float) -> Scene:
         name=name,
         camera=flat_camera(),
         objects=tuple(objects),
-        animation=Animation(fps=float(FPS), frames=LEAST_FRAMES if rev_per_s else 1),
+        animation=Animation(fps=float(FPS), frames=loop_frames(rev_per_s) if rev_per_s else 1, shutter=shutter),
         facts=Facts(edges=tuple(edges)),
     )
 
@@ -98,6 +98,7 @@ ENTRIES = (
             "slope": Parameter(0.1, -4.0, 4.0, "float", "rise over run of the edge"),
             "offset": Parameter(0.0, -1.0, 1.0, "float", "height of the edge at the middle, world units"),
             "speed": Parameter(0.0, -2.0, 2.0, "float", "upward pan of the edge, world units per second"),
+            "shutter": Parameter(0.0, 0.0, 1.0, "float", "open share of the frame interval"),
         },
     ),
     SceneEntry(
@@ -108,6 +109,7 @@ ENTRIES = (
         {
             "wedges": Parameter(18, 4, 128, "int", "wedges in the circle, thick and thin in turn; even"),
             "rev_per_s": Parameter(0.0, -10.0, 10.0, "float", "turns per second of the whole fan"),
+            "shutter": Parameter(0.0, 0.0, 1.0, "float", "open share of the frame interval"),
         },
     ),
 )

@@ -6,10 +6,10 @@ object does, a pan must be how an object moves against the camera. What a fact s
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from aliasbench.scenes.errors import InputError
 from aliasbench.scenes.limits import COUNT, LENGTH
 from aliasbench.scenes.model import (
     Camera,
@@ -32,14 +32,23 @@ TOLERANCE = 1e-6  # of lengths relative to the edge's or the scene's size, of ra
 def read_facts(table: Table, objects: Sequence[Surface], camera: Camera) -> Facts:
     """Return the facts of the table `fact`, each kind a table or an array of tables.
 
+    Parameters
+    ----------
+    table : Table
+    objects : sequence of Surface
+        What facts are checked against; without any, only each by itself.
+    camera : Camera
+
     Raises
     ------
     InputError
         If a fact is incomplete, impossible, or contradicts the objects and the camera.
     """
     table.check_keys(("edge", "rotor", "grating", "pan"))
+    edges = _one_or_more(table, "edge")
+    solid = _solid(objects) if edges and objects else None
     return Facts(
-        edges=tuple(_read_edge(t, objects) for t in _one_or_more(table, "edge")),
+        edges=tuple(_read_edge(t, solid) for t in edges),
         rotors=tuple(_read_rotor(t, objects) for t in _one_or_more(table, "rotor")),
         gratings=tuple(_read_grating(t) for t in _one_or_more(table, "grating")),
         pans=tuple(_read_pan(t, objects, camera) for t in _one_or_more(table, "pan")),
@@ -52,44 +61,70 @@ def _one_or_more(table: Table, key: str) -> list[Table]:
     return table.tables(key)
 
 
-def _read_edge(table: Table, objects: Sequence[Surface]) -> EdgeFact:
+def _read_edge(table: Table, solid: "_Solid | None") -> EdgeFact:
     table.check_keys(("from", "to"))
+    mark = table.problems.mark()
     start, end = table.vector("from"), table.vector("to")
-    if start == end:
-        table.refuse("to", "a point that differs from `from`")
-    if objects and not any(_touches(np.array([start, end]), s) for s in objects):
-        raise InputError(
-            f"{table.file}: {table.path} from {list(start)} to {list(end)} touches no object; it must lie on one"
+    if start == end and table.problems.sound_since(mark):
+        table.report("to", "a point that differs from `from`")
+    if solid is not None and table.problems.sound_since(mark) and not _touches(np.array([start, end]), solid):
+        table.problems.report(
+            table.place, f"{table.path} from {list(start)} to {list(end)} touches no object; it must lie on one"
         )
     return EdgeFact(start, end)
 
 
-def _touches(edge: FloatArray, surface: Surface) -> bool:
-    """Return whether a segment (2, 3) meets a surface in some of its points.
+@dataclass(frozen=True, slots=True, eq=False)
+class _Solid:
+    """The triangles of all objects: a corner, two sides, normal, its square, and how large their object is."""
+
+    corner: FloatArray
+    sides: tuple[FloatArray, FloatArray]
+    normal: FloatArray
+    square: FloatArray
+    size: FloatArray
+    low: FloatArray
+    high: FloatArray
+
+
+def _solid(objects: Sequence[Surface]) -> _Solid:
+    corners = np.concatenate([s.vertices[s.triangles] for s in objects])
+    sizes = [np.full(len(s.triangles), np.abs(s.vertices).max(initial=0.0)) for s in objects]
+    u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    normal = np.cross(u, v)
+    square = np.einsum("ij,ij->i", normal, normal)
+    keep = square > 0.0
+    corners = corners[keep]
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    return _Solid(corners[:, 0], (u[keep], v[keep]), normal[keep], square[keep], np.concatenate(sizes)[keep], low, high)
+
+
+def _touches(edge: FloatArray, solid: _Solid) -> bool:
+    """Return whether a segment (2, 3) meets an object in some of its points.
 
     It need not run along an outline: the edge may be one of the texture's.
     """
+    close = TOLERANCE * np.maximum(solid.size, np.linalg.norm(edge[1] - edge[0]))
+    # Inside is judged with a tolerance too, relative to the triangle.
+    margin = close[:, None] + 2 * TOLERANCE * (solid.high - solid.low)
+    meets = (solid.low - margin <= edge.max(axis=0)) & (solid.high + margin >= edge.min(axis=0))
+    near = np.flatnonzero(meets.all(axis=1))
     points = edge[0] + np.linspace(0.0, 1.0, _EDGE_POINTS)[:, None] * (edge[1] - edge[0])
-    a, b, c = (surface.vertices[surface.triangles[:, k]] for k in range(3))
-    u, v = b - a, c - a
-    normal = np.cross(u, v)
-    area = np.einsum("ij,ij->i", normal, normal)
-    keep = area > 0.0
-    a, u, v, normal, area = a[keep], u[keep], v[keep], normal[keep], area[keep]
-    close = TOLERANCE * max(float(np.abs(surface.vertices).max(initial=0.0)), float(np.linalg.norm(edge[1] - edge[0])))
+    u, v, normal, square = solid.sides[0][near], solid.sides[1][near], solid.normal[near], solid.square[near]
     for point in points:
-        w = point - a
-        height = np.abs(np.einsum("ij,ij->i", w, normal)) / np.sqrt(area)
-        first = np.einsum("ij,ij->i", np.cross(w, v), normal) / area
-        second = np.einsum("ij,ij->i", np.cross(u, w), normal) / area
+        w = point - solid.corner[near]
+        height = np.abs(np.einsum("ij,ij->i", w, normal)) / np.sqrt(square)
+        first = np.einsum("ij,ij->i", np.cross(w, v), normal) / square
+        second = np.einsum("ij,ij->i", np.cross(u, w), normal) / square
         inside = (first >= -TOLERANCE) & (second >= -TOLERANCE) & (first + second <= 1.0 + TOLERANCE)
-        if bool((inside & (height <= close)).any()):
+        if bool((inside & (height <= close[near])).any()):
             return True
     return False
 
 
 def _read_rotor(table: Table, objects: Sequence[Surface]) -> RotorFact:
     table.check_keys(("center", "axis", "blades", "duty", "rev_per_s", "inner", "outer"))
+    mark = table.problems.mark()
     fact = RotorFact(
         center=table.vector("center", (0.0, 0.0, 0.0)),
         axis=table.direction("axis", (0.0, 0.0, 1.0)),
@@ -99,8 +134,10 @@ def _read_rotor(table: Table, objects: Sequence[Surface]) -> RotorFact:
         inner=table.number("inner", at_least=0.0, at_most=LENGTH),
         outer=table.number("outer", above=0.0, at_most=LENGTH),
     )
+    if not table.problems.sound_since(mark):
+        return fact
     if fact.inner >= fact.outer:
-        table.refuse("inner", f"less than outer, {fact.outer:g}")
+        table.report("inner", f"less than outer, {fact.outer:g}")
     rates = [
         rate
         for surface in objects
@@ -112,7 +149,7 @@ def _read_rotor(table: Table, objects: Sequence[Surface]) -> RotorFact:
     known = bool(objects) and all(s.motion.matrices is None for s in objects)
     if known and fact.rev_per_s != 0.0 and not any(abs(rate - fact.rev_per_s) <= close for rate in rates):
         turning = ", ".join(f"{rate:g}" for rate in sorted(set(rates))) or "none"
-        table.refuse("rev_per_s", f"the rate at which an object spins about this axis and center ({turning})")
+        table.report("rev_per_s", f"the rate at which an object spins about this axis and center ({turning})")
     return fact
 
 
@@ -131,14 +168,16 @@ def _read_grating(table: Table) -> GratingFact:
     table.check_keys(("cycles_per_unit",))
     x, y = table.numbers("cycles_per_unit", 2, LENGTH)
     if x == y == 0.0:
-        table.refuse("cycles_per_unit", "a frequency vector: two finite numbers, not both zero")
+        table.report("cycles_per_unit", "a frequency vector: two finite numbers, not both zero")
     return GratingFact((x, y))
 
 
 def _read_pan(table: Table, objects: Sequence[Surface], camera: Camera) -> PanFact:
     table.check_keys(("velocity", "period"))
+    mark = table.problems.mark()
     fact = PanFact(table.direction("velocity"), table.number("period", at_least=1 / COUNT, at_most=LENGTH))
     known = bool(objects) and all(s.motion.matrices is None and s.motion.spin is None for s in objects)
+    known = known and table.problems.sound_since(mark)
     seen = [np.array(s.motion.velocity) - np.array(camera.velocity) for s in objects]
     close = TOLERANCE * math.hypot(*fact.velocity)
     # Either sign: a pan is named after the camera's way as often as after the picture's.
@@ -146,5 +185,5 @@ def _read_pan(table: Table, objects: Sequence[Surface], camera: Camera) -> PanFa
         min(np.linalg.norm(v - fact.velocity), np.linalg.norm(v + fact.velocity)) <= close for v in seen
     ):
         moving = ", ".join(sorted({str(v.tolist()) for v in seen}))
-        table.refuse("velocity", f"how an object moves against the camera ({moving})")
+        table.report("velocity", f"how an object moves against the camera ({moving})")
     return fact

@@ -1,18 +1,21 @@
-"""What a scene file says about textures, objects and lights, as the model's own data.
+"""What a scene file says about objects and lights, as the model's own data.
 
-Apart from `files`, which knows texts, paths and the camera: here are the keys of one object, and which go together.
+Apart from `files`, which knows texts, paths and the camera: here are the keys of one object, and which go together. An
+object is a polygon, a quad, a model file (`mesh`), or triangles written out: `vertices` with `triangles`, the form in
+which meshes are exported.
 """
 
 from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
-from aliasbench.scenes.errors import InputError, NotAvailableError, unknown_name
-from aliasbench.scenes.limits import COUNT
+from aliasbench.scenes.errors import InputError, unknown_name
+from aliasbench.scenes.inline_data import read_rows, read_triangles
+from aliasbench.scenes.limits import COUNT, LENGTH, MAX_NAME
 from aliasbench.scenes.model import (
-    Checker,
-    Grating,
+    FloatArray,
     Light,
     Material,
     Motion,
@@ -20,13 +23,12 @@ from aliasbench.scenes.model import (
     Surface,
     Texture,
     Vec3,
-    ZonePlate,
+    read_only,
 )
 from aliasbench.scenes.schema import Table
 from aliasbench.scenes.shapes import QUAD_UV, polygon
-from aliasbench.scenes.textures import load_image
 
-_SHAPES = ("polygon", "quad", "mesh")
+SHAPES = ("polygon", "quad", "mesh", "vertices")
 _MATERIALS: Mapping[str, tuple[str, ...]] = {
     "unlit": (),
     "diffuse": (),
@@ -34,94 +36,110 @@ _MATERIALS: Mapping[str, tuple[str, ...]] = {
     "glass": ("ior", "abbe"),
 }
 _OBJECT = (
-    *_SHAPES,
-    *("color", "uv", "texture", "material", "roughness", "ior", "abbe", "velocity", "spin", "matrices"),
+    *("name", *SHAPES, "triangles", "color", "uv", "texture"),
+    *("material", "roughness", "ior", "abbe", "velocity", "spin", "matrices"),
 )
-_TEXTURES = ("checker", "image", "grating", "zone_plate")
 
 
-def read_textures(table: Table, folder: Path) -> dict[str, Texture]:
-    """Return the textures of the table `texture` by name; image paths are relative to `folder`."""
-    return {name: _read_texture(table.table(name), folder) for name in table.values}
+@dataclass(frozen=True, slots=True)
+class Pieces:
+    """The surfaces of one `[[object]]`, and the textures that it brings along (those of a model file)."""
+
+    surfaces: tuple[Surface, ...]
+    textures: Mapping[str, Texture] = field(default_factory=dict)
 
 
-def _read_texture(table: Table, folder: Path) -> Texture:
-    table.check_keys((*_TEXTURES, "alpha_cutoff"))
-    kind = table.check_exclusive(_TEXTURES, "a texture")
-    if table.has("alpha_cutoff") and kind != "image":
-        table.refuse("alpha_cutoff", "left out: it belongs to textures with an image")
-    if kind == "image":
-        source = table.text("image")
-        cutoff = table.number("alpha_cutoff", at_least=0.0, at_most=1.0) if table.has("alpha_cutoff") else None
-        try:
-            return load_image(folder / source, alpha_cutoff=cutoff, source=source)
-        except InputError as error:
-            raise InputError(f"{table.file}: {table.where('image')}: {error}") from error
-    inner = table.table(kind)
-    if kind == "checker":
-        inner.check_keys(("squares", "black", "white"))
-        across, up = inner.numbers("squares", 2, COUNT)
-        if min(across, up) <= 0.0:
-            inner.refuse("squares", f"two finite numbers over 0 and at most {COUNT:g} (squares per unit of u and of v)")
-        return Checker((across, up), inner.color("black", (0.0, 0.0, 0.0)), inner.color("white", (1.0, 1.0, 1.0)))
-    if kind == "grating":
-        inner.check_keys(("cycles", "angle_deg", "phase", "profile", "low", "high"))
-        return Grating(
-            cycles=inner.number("cycles", at_least=0.0, at_most=COUNT),
-            angle_deg=inner.number("angle_deg", 0.0, at_least=-COUNT, at_most=COUNT),
-            phase=inner.number("phase", 0.0, at_least=-COUNT, at_most=COUNT),
-            profile="sine" if inner.choice("profile", ("sine", "square"), "sine") == "sine" else "square",
-            low=inner.color("low", (0.0, 0.0, 0.0)),
-            high=inner.color("high", (1.0, 1.0, 1.0)),
-        )
-    inner.check_keys(("center", "k", "phase"))
-    u, v = inner.numbers("center", 2, COUNT) if inner.has("center") else (0.5, 0.5)
-    return ZonePlate(
-        center=(u, v),
-        k=inner.number("k", above=0.0, at_most=COUNT),
-        phase=inner.number("phase", 0.0, at_least=-COUNT, at_most=COUNT),
-    )
+def read_object(table: Table, textures: Mapping[str, Texture], folder: Path) -> Pieces:
+    """Return what one `[[object]]` is.
 
-
-def read_object(table: Table, textures: Mapping[str, Texture]) -> Surface:
-    """Return the surface of one `[[object]]`; its texture must be one of `textures`."""
+    Parameters
+    ----------
+    table : Table
+    textures : mapping of str to Texture
+        What its texture must be one of.
+    folder : Path
+        Of the scene file, to which the paths of model files are relative.
+    """
     table.check_keys(_OBJECT)
-    shape = table.check_exclusive(_SHAPES, "an object")
+    shape = table.problems.attempt(lambda: table.check_exclusive(SHAPES, "an object"))
+    if table.has("triangles") and shape not in ("vertices", None):
+        table.report("triangles", "left out: it belongs to vertices")
     if shape == "mesh":
-        raise NotAvailableError(
-            f"{table.file}: {table.where('mesh')}: meshes are not read in this version; polygon and quad are"
-        )
-    points = table.points(shape, 3, 4 if shape == "quad" else None)
-    texture = table.text("texture") if table.has("texture") else None
-    if texture is not None and texture not in textures:
-        problem = unknown_name("texture", texture, textures)
-        raise InputError(f"{table.file}: {table.where('texture')}: {problem}")
-    uv = table.points("uv", 2, limit=COUNT) if table.has("uv") else np.array(QUAD_UV) if shape == "quad" else None
-    if uv is not None and len(uv) != len(points):
-        table.refuse("uv", f"a list of {len(points)} points of 2 numbers each, one for each point of the {shape}")
-    if texture is not None and uv is None:
-        table.refuse("uv", f"given with a texture: {len(points)} points of 2 numbers each, one for each of the polygon")
+        # Imported here: it reads its other keys with this module's functions.
+        from aliasbench.scenes.file_meshes import read_mesh_object
+
+        return read_mesh_object(table, textures, folder)
+    points = np.empty((0, 3)) if shape is None else _read_points(table, shape)
+    texture = read_texture_name(table, textures)
+    uv = None if shape is None else _read_uv(table, shape, points)
+    if texture is not None and uv is None and shape is not None and len(points):
+        table.report("uv", f"given with a texture: {len(points)} points of 2 numbers each, {_one_for_each(shape)}")
+        texture = None
+    surface = Surface(
+        points,
+        np.empty((0, 3), dtype=np.int32),
+        uv=uv,
+        texture=texture,
+        color=table.color("color", (1.0, 1.0, 1.0)),
+        material=read_material(table),
+        motion=table.problems.attempt(lambda: read_motion(table)) or Motion(),
+        name=read_name(table, ""),
+    )
+    if shape is None or len(points) == 0:
+        table.problems.give_up()
+    if shape == "vertices":
+        indices = read_triangles(table, "triangles", len(points))
+        return Pieces((replace(surface, triangles=read_only(indices), is_polygon=False),))
     try:
-        return polygon(
-            points,
-            color=table.color("color", (1.0, 1.0, 1.0)),
-            uv=uv,
-            texture=texture,
-            material=_read_material(table),
-            motion=_read_motion(table),
-        )
+        outline = polygon(points)
     except InputError as error:
-        if str(error).startswith("polygon: "):
-            raise InputError(f"{table.file}: {table.where(shape)}: {str(error).removeprefix('polygon: ')}") from error
-        raise
+        table.problems.refuse((*table.place, shape), f"{table.where(shape)}: {str(error).removeprefix('polygon: ')}")
+    return Pieces((replace(surface, vertices=outline.vertices, triangles=outline.triangles),))
 
 
-def _read_material(table: Table) -> Material:
+def _read_points(table: Table, shape: str) -> FloatArray:
+    if shape == "vertices":
+        return read_only(read_rows(table, "vertices", 3, limit=LENGTH))
+    return read_only(table.points(shape, 3, 4 if shape == "quad" else None))
+
+
+def _read_uv(table: Table, shape: str, points: FloatArray) -> FloatArray | None:
+    if not table.has("uv"):
+        return read_only(np.array(QUAD_UV)) if shape == "quad" else None
+    uv = read_rows(table, "uv", 2, limit=COUNT)
+    if len(uv) and len(points) and len(uv) != len(points):
+        table.report("uv", f"a list of {len(points)} points of 2 numbers each, {_one_for_each(shape)}")
+    return read_only(uv)
+
+
+def _one_for_each(shape: str) -> str:
+    return "one for each of the vertices" if shape == "vertices" else f"one for each point of the {shape}"
+
+
+def read_texture_name(table: Table, textures: Mapping[str, Texture]) -> str | None:
+    """Return the key `texture` of an object, None where it has none."""
+    name = table.text("texture") if table.has("texture") else None
+    if name and name not in textures:
+        table.fail("texture", f"{table.where('texture')}: {unknown_name('texture', name, textures)}")
+    return name or None
+
+
+def read_name(table: Table, default: str, most: int = MAX_NAME) -> str:
+    """Return the key `name`, a text that may be printed as it is."""
+    name = table.text("name", default)
+    if len(name) > most or not name.isprintable():
+        table.report("name", f"a text of printable characters, at most {most}")
+        return default
+    return name
+
+
+def read_material(table: Table) -> Material:
+    """Return the material of an object."""
     kind = table.choice("material", tuple(_MATERIALS), "unlit")
     for owner, keys in _MATERIALS.items():
         for key in keys:
             if table.has(key) and owner != kind:
-                table.refuse(key, f'left out: it belongs to material = "{owner}"')
+                table.report(key, f'left out: it belongs to material = "{owner}"')
     if kind == "glossy":
         return Material("glossy", roughness=table.number("roughness", 0.1, above=0.0, at_most=1.0))
     if kind == "glass":
@@ -130,11 +148,12 @@ def _read_material(table: Table) -> Material:
     return Material("diffuse" if kind == "diffuse" else "unlit")
 
 
-def _read_motion(table: Table) -> Motion:
+def read_motion(table: Table) -> Motion:
+    """Return the motion of an object: a velocity and a spin, or two matrices."""
     if table.has("matrices"):
         for key in ("velocity", "spin"):
             if table.has(key):
-                table.refuse(key, "left out: matrices say the whole motion")
+                table.report(key, "left out: matrices say the whole motion")
         return Motion(matrices=_read_matrices(table))
     spin = None
     if table.has("spin"):
@@ -149,7 +168,10 @@ def _read_motion(table: Table) -> Motion:
 
 
 def _read_matrices(table: Table) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    begin, end = table.points("matrices", 16, 2)
+    rows = table.points("matrices", 16, 2)
+    if len(rows) == 0:
+        table.problems.give_up()
+    begin, end = rows
     for matrix in (begin, end):
         if matrix[12:].tolist() != [0.0, 0.0, 0.0, 1.0]:
             table.refuse("matrices", "two affine row-major 4 x 4 matrices, each ending in 0, 0, 0, 1")
@@ -159,15 +181,17 @@ def _read_matrices(table: Table) -> tuple[tuple[float, ...], tuple[float, ...]]:
 def read_light(table: Table) -> Light:
     """Return the light of one `[[light]]`."""
     table.check_keys(("quad", "radiance"))
-    corners = table.points("quad", 3, 4)
+    corners, radiance = table.points("quad", 3, 4), table.color("radiance")
+    if len(corners) == 0:
+        table.problems.give_up()
     try:
         polygon(corners)
     except InputError as error:
-        raise InputError(f"{table.file}: {table.where('quad')}: {str(error).removeprefix('polygon: ')}") from error
+        table.problems.refuse((*table.place, "quad"), f"{table.where('quad')}: {str(error).removeprefix('polygon: ')}")
     if np.abs(corners[0] - corners[1] + corners[2] - corners[3]).max() > 1e-6 * np.ptp(corners, axis=0).max():
         table.refuse("quad", "the four corners of a parallelogram, in order")
     a, b, c, d = (_as_vec3(corner.tolist()) for corner in corners)
-    return Light((a, b, c, d), table.color("radiance"))
+    return Light((a, b, c, d), radiance)
 
 
 def _as_vec3(values: list[float]) -> Vec3:

@@ -1,24 +1,28 @@
 """Scenes from what a user writes: a catalog name, a name with parameters, or a TOML scene file (schema 1).
 
 A file is read strictly (see `schema`): whatever is wrong is one sentence with the file, the key's path, the value and
-what is allowed, before any renderer sees it.
+what is allowed, before any renderer sees it. `load_scene` raises the first; `checking` collects them all.
 """
 
 import math
 import re
 import tomllib
-from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from aliasbench.scenes.catalog import SCENES, build_scene
-from aliasbench.scenes.errors import InputError, NotAvailableError, shortened, unknown_name
+from aliasbench.scenes.errors import InputError, shortened, unknown_name
 from aliasbench.scenes.facts import read_facts
-from aliasbench.scenes.file_objects import read_light, read_object, read_textures
+from aliasbench.scenes.file_objects import SHAPES, Pieces, read_light, read_name, read_object
+from aliasbench.scenes.file_textures import read_textures
 from aliasbench.scenes.limits import (
     COUNT,
     LENGTH,
+    MAX_CATALOG_NAME,
+    MAX_FILE_BYTES,
+    MAX_NAME,
     MIN_FOV_DEG,
     MIN_FPS,
     MIN_LENGTH,
@@ -27,13 +31,13 @@ from aliasbench.scenes.limits import (
     end_of,
     reach_fault,
 )
-from aliasbench.scenes.model import Animation, Camera, Scene, Surface, Texture
+from aliasbench.scenes.meshes import MODEL_SUFFIXES, load_model_scene
+from aliasbench.scenes.model import Animation, Camera, Facts, Scene, Surface, Texture
+from aliasbench.scenes.problems import Problems
 from aliasbench.scenes.projection import view_at
 from aliasbench.scenes.schema import Table
 
 SCHEMA = 1
-MAX_NAME = 200  # characters of a scene's name: it is shown in tables and stands in records
-MODEL_SUFFIXES = (".glb", ".gltf", ".obj", ".ply")
 _ROOT = ("schema", "name", "background", "contrast", "animation", "camera", "object", "texture", "light", "fact")
 _CAMERA = (
     *("projection", "position", "target", "up", "height", "fov_y_deg"),
@@ -47,15 +51,14 @@ def load_scene(text: str) -> Scene:
     Parameters
     ----------
     text : str
-        The path of a scene file (anything that exists as a file, ends in ``.toml`` or has a path separator); otherwise
-        a name in `catalog.SCENES`, with parameters or without: ``propeller:blades=5,rev_per_s=23.5``.
+        The path of a model file (ends in one of `meshes.MODEL_SUFFIXES`) or of a scene file (anything else that exists
+        as a file, ends in ``.toml`` or has a path separator); otherwise a name in `catalog.SCENES`, with parameters or
+        without: ``propeller:blades=5,rev_per_s=23.5``.
 
     Raises
     ------
     InputError
         If there is no such scene, or the file or a parameter is wrong.
-    NotAvailableError
-        For meshes, which this version does not read.
     TypeError
         If `text` is none.
     """
@@ -64,9 +67,7 @@ def load_scene(text: str) -> Scene:
     given = text.strip()
     path = Path(given)
     if path.suffix.lower() in MODEL_SUFFIXES:
-        raise NotAvailableError(
-            f"scene {given!r}: this version reads no model files; scene files (.toml) with polygons and quads it does"
-        )
+        return load_model_scene(path)
     if given and (path.suffix.lower() == ".toml" or "/" in given or "\\" in given or _is_file(path)):
         return read_scene_file(path)
     name = given.partition(":")[0].strip()
@@ -78,31 +79,69 @@ def load_scene(text: str) -> Scene:
 
 def read_scene_file(path: Path) -> Scene:
     """Return the scene of a TOML file (schema 1); see `load_scene`."""
-    file = str(path)
-    root = Table(file, "", _parse(path))
+    return read_scene_text(read_text(path), str(path), path.parent)
+
+
+def read_scene_text(text: str, file: str, folder: Path) -> Scene:
+    """Return the scene of a TOML text.
+
+    Parameters
+    ----------
+    text : str
+    file : str
+        What messages call it.
+    folder : Path
+        To which its paths are relative.
+    """
+    return read_root(Table(Problems(file), "", parse_toml(text, file)), folder, Path(file).stem)
+
+
+def read_root(root: Table, folder: Path, stem: str) -> Scene:
+    """Return the scene of a file's root table; its name is `stem` where the file gives none.
+
+    Where problems are collected the scene is one only if there are none.
+    """
+    problems = root.problems
     # First: a newer file may well have keys that this version does not know.
-    schema = root.whole("schema", SCHEMA, at_least=0)
-    if schema != SCHEMA:
+    if root.whole("schema", SCHEMA, at_least=0) != SCHEMA:
         root.refuse("schema", f"{SCHEMA}, the only version of scene files that this version reads")
     root.check_keys(_ROOT)
-    animation = _read_animation(root.table("animation"))
-    camera = _read_camera(root.table("camera"), animation)
-    textures = read_textures(root.table("texture"), path.parent)
-    objects = tuple(_read_object(t, textures, camera, animation) for t in root.tables("object"))
-    name = root.text("name", path.stem)
-    if len(name) > MAX_NAME or not name.isprintable():
-        root.refuse("name", f"a text of printable characters, at most {MAX_NAME}")
+    start = problems.mark()
+    animation = problems.attempt(lambda: _read_animation(root.table("animation"))) or Animation()
+    camera = problems.attempt(lambda: _read_camera(root.table("camera"), animation)) or Camera("orthographic")
+    staged = problems.sound_since(start)
+    textures = problems.attempt(lambda: read_textures(root.table("texture"), folder)) or {}
+    after_textures = problems.mark()
+    objects: list[Surface] = []
+    brought: dict[str, Texture] = {}
+    for table in root.tables("object"):
+        pieces = problems.attempt(partial(read_object, table, textures, folder))
+        if pieces is None:
+            continue
+        if staged:
+            _check_reach(table, pieces, camera, animation)
+        objects += pieces.surfaces
+        brought |= pieces.textures
+    checked = objects if staged and problems.sound_since(after_textures) else []
     return Scene(
-        name=name,
+        name=read_name(root, stem, MAX_CATALOG_NAME if _is_of_catalog(root.values.get("name")) else MAX_NAME),
         camera=camera,
-        objects=objects,
-        textures=textures,
-        lights=tuple(read_light(t) for t in root.tables("light")),
+        objects=tuple(objects),
+        textures=textures | brought,
+        lights=tuple(
+            light
+            for table in root.tables("light")
+            if (light := problems.attempt(partial(read_light, table))) is not None
+        ),
         background=root.color("background", (0.0, 0.0, 0.0)),
         contrast=root.number("contrast", 1.0, at_least=1 / RADIANCE, at_most=RADIANCE),
         animation=animation,
-        facts=read_facts(root.table("fact"), objects, camera),
+        facts=problems.attempt(lambda: read_facts(root.table("fact"), checked, camera)) or Facts(),
     )
+
+
+def _is_of_catalog(name: object) -> bool:
+    return isinstance(name, str) and name.partition(":")[0] in SCENES
 
 
 def _is_file(path: Path) -> bool:
@@ -112,16 +151,27 @@ def _is_file(path: Path) -> bool:
         return False  # a text too long to be a path, say
 
 
-def _parse(path: Path) -> dict[str, object]:
+def read_text(path: Path) -> str:
+    """Return the text of a scene file; raise `InputError` if it cannot be read or is no text of a sensible size."""
     file = str(path)
     try:
+        with path.open("rb") as stream:
+            content = stream.read(MAX_FILE_BYTES + 1)
+        if len(content) > MAX_FILE_BYTES:
+            raise InputError(f"{file}: is over {MAX_FILE_BYTES >> 20} MiB; no scene file may be")
         # Some editors open a text in UTF-8 with a byte order mark, which says nothing.
-        text = path.read_bytes().decode("utf-8").removeprefix("\ufeff")
+        return content.decode("utf-8").removeprefix("\ufeff")
     except UnicodeDecodeError as error:
         raise InputError(f"{file}: byte {error.start} is not UTF-8; a scene file is a TOML text in UTF-8") from error
     except (OSError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
         reason = getattr(error, "strerror", None) or str(error)
         raise InputError(f"{file}: cannot be read ({reason}); the path of a scene file (.toml) is needed") from error
+
+
+def parse_toml(text: str, file: str) -> dict[str, object]:
+    """Return the tables of a TOML text; raise `InputError` with line and column if it is none."""
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -154,11 +204,12 @@ def _read_animation(table: Table) -> Animation:
 
 
 def _read_camera(table: Table, animation: Animation) -> Camera:
+    mark = table.problems.mark()
     table.check_keys(_CAMERA)
     flat = table.choice("projection", ("orthographic", "perspective"), "orthographic") == "orthographic"
     for key, wanted in (("fov_y_deg", "perspective"), ("height", "orthographic")):
         if table.has(key) and flat != (wanted == "orthographic"):
-            table.refuse(key, f'left out: it belongs to projection = "{wanted}"')
+            table.report(key, f'left out: it belongs to projection = "{wanted}"')
     camera = Camera(
         projection="orthographic" if flat else "perspective",
         position=table.vector("position", (0.0, 0.0, 5.0)),
@@ -173,22 +224,24 @@ def _read_camera(table: Table, animation: Animation) -> Camera:
             table.number("focus_distance", at_least=MIN_LENGTH, at_most=LENGTH) if table.has("focus_distance") else None
         ),
     )
+    if not table.problems.sound_since(mark):
+        return camera
     for t in _critical_times(camera, animation):
         try:
             view_at(camera, animation, 0, t * animation.fps, (2, 2))
         except InputError as error:
-            raise InputError(f"{table.file}: {error}") from error
+            key = "up" if " up " in str(error) else "position"
+            table.problems.refuse((*table.place, key), str(error))
     if (fault := camera_fault(camera, animation)) is not None:
         table.refuse(*fault)
     return camera
 
 
-def _read_object(table: Table, textures: Mapping[str, Texture], camera: Camera, animation: Animation) -> Surface:
-    surface = read_object(table, textures)
-    if (fault := reach_fault(surface, camera, animation)) is not None:
-        key, allowed = fault
-        table.refuse(next(k for k in ("polygon", "quad") if table.has(k)) if key == "shape" else key, allowed)
-    return surface
+def _check_reach(table: Table, pieces: Pieces, camera: Camera, animation: Animation) -> None:
+    for surface in pieces.surfaces:
+        if (fault := reach_fault(surface, camera, animation)) is not None:
+            key, allowed = fault
+            table.report(next(k for k in SHAPES if table.has(k)) if key == "shape" else key, allowed)
 
 
 def _critical_times(camera: Camera, animation: Animation) -> list[float]:

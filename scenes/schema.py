@@ -1,21 +1,23 @@
 """Reading a scene file's tables strictly: every refusal names file, key path, value and what is allowed.
 
 A scene with a misspelt key or a wrong type would render as something else without a word, so nothing is coerced but a
-whole number where a real one is meant (a bool is neither), and no key is ignored.
+whole number where a real one is meant (a bool is neither), and no key is ignored. What happens at a refusal is up to
+the file's `Problems`: the first is raised, or all are collected and stand-ins returned, which are valid by themselves.
 """
 
 import json
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NoReturn
 
 import numpy as np
 
-from aliasbench.scenes.errors import SHOWN, InputError, shortened, unknown_name
+from aliasbench.scenes.errors import SHOWN, shortened, unknown_name
 from aliasbench.scenes.limits import LENGTH, MIN_LENGTH, RADIANCE
 from aliasbench.scenes.model import FloatArray, Vec3
+from aliasbench.scenes.problems import Place, Problems
 
 _DECIMAL_BITS = 10_000  # longer integers Python may refuse to write in decimal; it never does in hexadecimal
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
@@ -27,16 +29,24 @@ class Table:
 
     Attributes
     ----------
-    file : str
-        The file's path as the user gave it.
+    problems : Problems
+        Of the file: where refusals go.
     path : str
         The table's key path, for example ``object[2].spin``; empty at the root.
     values : mapping of str to object
+    place : tuple of str and int
+        The path as keys and indices.
     """
 
-    file: str
+    problems: Problems
     path: str
     values: Mapping[str, object]
+    place: Place = field(default=())
+
+    @property
+    def file(self) -> str:
+        """The file's path as the user gave it."""
+        return self.problems.file
 
     def has(self, key: str) -> bool:
         """Return whether the key is given."""
@@ -47,27 +57,37 @@ class Table:
         written = shortened(key) if _BARE_KEY.fullmatch(key) else shown(key)
         return f"{self.path}.{written}" if self.path else written
 
-    def refuse(self, key: str, allowed: str) -> NoReturn:
-        """Raise the error for a key's value (or its absence), saying what is allowed."""
+    def report(self, key: str, allowed: str) -> None:
+        """Report a key's value (or its absence), saying what is allowed."""
         if key not in self.values:
-            raise InputError(f"{self.file}: {self.where(key)} is missing; it must be {allowed}")
-        raise InputError(f"{self.file}: {self.where(key)} = {shown(self.values[key])}: must be {allowed}")
+            self.fail(key, f"{self.where(key)} is missing; it must be {allowed}")
+        else:
+            self.fail(key, f"{self.where(key)} = {shown(self.values[key])}: must be {allowed}")
+
+    def refuse(self, key: str, allowed: str) -> NoReturn:
+        """Report a key's value (or its absence) and give up the part of the file that it is in."""
+        self.report(key, allowed)
+        self.problems.give_up()
+
+    def fail(self, key: str, text: str) -> None:
+        """Report a problem with a key in words of its own; the text says where it is."""
+        self.problems.report((*self.place, key), text)
 
     def check_keys(self, known: Sequence[str]) -> None:
-        """Raise if the table has a key that is not known."""
+        """Report every key of the table that is not known."""
         for key, value in self.values.items():
             if key not in known:
-                problem = unknown_name("key", key, known)
-                raise InputError(f"{self.file}: {self.where(key)} = {shown(value)}: {problem}")
+                self.fail(key, f"{self.where(key)} = {shown(value)}: {unknown_name('key', key, known)}")
 
     def check_exclusive(self, keys: Sequence[str], what: str) -> str:
-        """Return which one of the keys is given; raise if it is none or more than one."""
+        """Return which one of the keys is given; refuse none and more than one."""
         given = [key for key in keys if key in self.values]
-        if len(given) == 1:
-            return given[0]
-        place = self.path or "the file"
-        found = f"{' and '.join(given)} together" if given else "none of them"
-        raise InputError(f"{self.file}: {place} has {found}; {what} needs exactly one of {', '.join(keys)}")
+        if len(given) != 1:
+            place = self.path or "the file"
+            found = f"{' and '.join(given)} together" if given else "none of them"
+            wrong = (*self.place, given[1]) if given else self.place
+            self.problems.refuse(wrong, f"{place} has {found}; {what} needs exactly one of {', '.join(keys)}")
+        return given[0]
 
     def number(
         self,
@@ -86,7 +106,8 @@ class Table:
         if number is None or not (above < number < below and at_least <= number <= at_most):
             limits = [("over", above), ("at least", at_least), ("under", below), ("at most", at_most)]
             text = " and ".join(f"{word} {limit:g}" for word, limit in limits if math.isfinite(limit))
-            self.refuse(key, f"a finite number {text}".strip())
+            self.report(key, f"a finite number {text}".strip())
+            return _between_limits(default, max(above, at_least), min(below, at_most))
         return number
 
     def whole(self, key: str, default: int | None = None, *, at_least: int) -> int:
@@ -95,31 +116,34 @@ class Table:
             return default
         value = self.values.get(key)
         if not isinstance(value, int) or isinstance(value, bool) or not at_least <= value < 2**31:
-            self.refuse(key, f"a whole number, {at_least} or more")
+            self.report(key, f"a whole number, {at_least} or more")
+            return at_least if default is None else default
         return value
 
     def text(self, key: str, default: str | None = None) -> str:
-        """Return a text that is not empty."""
+        """Return a text that is not empty (a default may be)."""
         if default is not None and key not in self.values:
             return default
         value = self.values.get(key)
         if not isinstance(value, str) or not value:
-            self.refuse(key, "a text that is not empty")
+            self.report(key, "a text that is not empty")
+            return default or ""
         return value
 
     def choice(self, key: str, known: Sequence[str], default: str) -> str:
         """Return one of the known texts."""
         value = self.text(key, default)
         if value not in known:
-            problem = unknown_name(key, value, known)
-            raise InputError(f"{self.file}: {self.where(key)} = {shown(value)}: {problem}")
+            self.fail(key, f"{self.where(key)} = {shown(value)}: {unknown_name(key, value, known)}")
+            return default
         return value
 
     def numbers(self, key: str, count: int, limit: float) -> tuple[float, ...]:
         """Return exactly `count` numbers from -limit to limit."""
         numbers = _finite_list(self.values.get(key), count, limit)
         if numbers is None:
-            self.refuse(key, f"a list of {count} finite numbers{_between(limit)}")
+            self.report(key, f"a list of {count} finite numbers{between(limit)}")
+            return (1.0,) * count
         return numbers
 
     def vector(self, key: str, default: Vec3 | None = None, *, limit: float = LENGTH) -> Vec3:
@@ -133,24 +157,30 @@ class Table:
         """Return three finite numbers, not all zero."""
         vector = self.vector(key, default)
         if math.hypot(*vector) < MIN_LENGTH:
-            self.refuse(key, f"a direction: three finite numbers, not all zero (at least {MIN_LENGTH:g} long)")
+            self.report(key, f"a direction: three finite numbers, not all zero (at least {MIN_LENGTH:g} long)")
+            return (0.0, 0.0, 1.0)
         return vector
 
     def color(self, key: str, default: Vec3 | None = None) -> Vec3:
         """Return linear RGB, each component at least 0 and at most `limits.RADIANCE`."""
         color = self.vector(key, default, limit=math.inf)
         if not 0.0 <= min(color) <= max(color) <= RADIANCE:
-            self.refuse(key, f"linear RGB, three finite numbers from 0 to {RADIANCE:g}")
+            self.report(key, f"linear RGB, three finite numbers from 0 to {RADIANCE:g}")
+            return (1.0, 1.0, 1.0)
         return color
 
     def points(self, key: str, width: int, count: int | None = None, *, limit: float = LENGTH) -> FloatArray:
-        """Return a list of `count` (or any number of) points as (n, width) float64, all from -limit to limit."""
+        """Return a list of `count` (or any number of) points as (n, width) float64, all from -limit to limit.
+
+        The stand-in for what is no such list has no points.
+        """
         value = self.values.get(key)
         rows = [_finite_list(row, width, limit) for row in value] if isinstance(value, list) else []
         complete = [row for row in rows if row is not None]
         if not rows or len(complete) < len(rows) or count not in (None, len(rows)):
             many = f"{count} " if count else ""
-            self.refuse(key, f"a list of {many}points of {width} finite numbers each{_between(limit)}")
+            self.report(key, f"a list of {many}points of {width} finite numbers each{between(limit)}")
+            return np.empty((0, width))
         return np.array(complete, dtype=np.float64)
 
     def table(self, key: str) -> "Table":
@@ -158,14 +188,17 @@ class Table:
         value = self.values.get(key, {})
         if not isinstance(value, dict):
             self.refuse(key, "a table")
-        return Table(self.file, self.where(key), value)
+        return Table(self.problems, self.where(key), value, (*self.place, key))
 
     def tables(self, key: str) -> list["Table"]:
         """Return the tables of an array of tables, none where the key is not given."""
         value = self.values.get(key, [])
         if not isinstance(value, list) or not all(isinstance(item, dict) for item in value):
-            self.refuse(key, f"an array of tables, each under [[{self.where(key)}]]")
-        return [Table(self.file, f"{self.where(key)}[{k}]", item) for k, item in enumerate(value)]
+            self.report(key, f"an array of tables, each under [[{self.where(key)}]]")
+            return []
+        return [
+            Table(self.problems, f"{self.where(key)}[{k}]", item, (*self.place, key, k)) for k, item in enumerate(value)
+        ]
 
 
 def shown(value: object) -> str:
@@ -203,7 +236,15 @@ def _pieces(value: object) -> Iterator[str]:
         yield "".join(c if c.isprintable() else json.dumps(c)[1:-1] for c in written)
 
 
-def _between(limit: float) -> str:
+def _between_limits(default: float | None, low: float, high: float) -> float:
+    """Return a number in a range, for a key whose own is not."""
+    if default is not None:
+        return default
+    return 1.0 if low < 1.0 < high else (low + high) / 2 if math.isfinite(low + high) else max(low, min(high, 0.0))
+
+
+def between(limit: float) -> str:
+    """Return a range from -limit to limit in words, for a sentence that goes on; nothing where there is no limit."""
     return f" from {-limit:g} to {limit:g}" if math.isfinite(limit) else ""
 
 

@@ -19,6 +19,8 @@ from aliasbench.scenes.stderr import silenced_stderr
 TexelArray = NDArray[np.float32]
 BAKED_SIZE = 64  # texels across a baked period: a checker is exact at any even size
 ZONE_PLATE_SIZE = 1024  # texels across uv 0..1
+MOST_TEXELS = 2**26  # 8192 x 8192, a gigabyte of them: a few kilobytes of a file can claim any number
+_BAND = 2**16  # texels converted at a time
 
 
 def srgb_to_linear(values: NDArray[np.floating]) -> FloatArray:
@@ -35,45 +37,90 @@ def linear_to_srgb(values: NDArray[np.floating]) -> FloatArray:
     return out
 
 
-def load_image(path: Path, *, alpha_cutoff: float | None = None, source: str | None = None) -> ImageTexture:
+def load_image(
+    path: Path,
+    *,
+    alpha_cutoff: float | None = None,
+    source: str | None = None,
+    label: str | None = None,
+    most_texels: int = MOST_TEXELS,
+) -> ImageTexture:
     """Return an image file as linear RGBA texels, bottom row first. Integer images are sRGB, float ones linear.
+
+    Parameters
+    ----------
+    path : Path
+    alpha_cutoff, source : optional
+        Of the texture; the path is the source where none is given.
+    label : str, optional
+        What messages call the image, where its path says nothing to people (an image inside a model file).
+    most_texels : int
+        How many texels it may have: looked at before any is decoded.
 
     Raises
     ------
     InputError
-        If the file is missing or not a regular one, cannot be read, has no pixels, or has a value that is not finite or
-        over `limits.RADIANCE`.
+        If the file is missing or not a regular one, cannot be read, has no pixels or too many, or has a value that is
+        not finite or over `limits.RADIANCE`.
     """
     import OpenImageIO as oiio
 
+    what = label or f"image {str(path)!r}"
     try:
         if not path.is_file():
-            raise InputError(f"image {str(path)!r}: {'not a regular file' if path.exists() else 'no such file'}")
+            raise InputError(f"{what}: {'not a regular file' if path.exists() else 'no such file'}")
     except OSError as error:
-        raise InputError(f"image {str(path)!r}: cannot be read ({error.strerror})") from error
+        raise InputError(f"{what}: cannot be read ({error.strerror})") from error
     with silenced_stderr():
-        image = oiio.ImageInput.open(str(path))
+        # A colour is a colour wherever it is drawn: the library would otherwise return it multiplied by its alpha.
+        options = oiio.ImageSpec()
+        options.attribute("oiio:UnassociatedAlpha", 1)
+        image = oiio.ImageInput.open(str(path), options)
         if image is None:
-            raise InputError(f"image {str(path)!r}: cannot be read ({_first_line(oiio.geterror())})")
+            raise InputError(f"{what}: cannot be read ({_first_line(oiio.geterror())})")
         try:
             spec = image.spec()
-            is_float = spec.format.basetype in (oiio.HALF, oiio.FLOAT, oiio.DOUBLE)
-            pixels = image.read_image(0, 0, 0, min(spec.nchannels, 4), oiio.FLOAT)
+            kind = spec.format.basetype
+            if spec.width * spec.height > most_texels:
+                raise InputError(f"{what}: has {spec.width} x {spec.height} texels; at most {most_texels} are allowed")
+            wanted = oiio.UINT8 if kind == oiio.UINT8 else oiio.FLOAT
+            pixels = image.read_image(0, 0, 0, min(spec.nchannels, 4), wanted)
             if pixels is None or pixels.size == 0:
-                raise InputError(f"image {str(path)!r}: cannot be read ({_first_line(image.geterror())})")
+                raise InputError(f"{what}: cannot be read ({_first_line(image.geterror())})")
         finally:
             image.close()
-    data = np.asarray(pixels, dtype=np.float64).reshape(spec.height, spec.width, -1)
-    color = data[..., : 1 if data.shape[2] < 3 else 3]
-    alpha = data[..., -1:] if data.shape[2] in (2, 4) else np.ones_like(data[..., :1])
-    if not is_float:
-        color = srgb_to_linear(color)
-    texels = np.concatenate([np.broadcast_to(color, (*color.shape[:2], 3)), alpha], axis=2)
-    if not np.isfinite(texels).all():
-        raise InputError(f"image {str(path)!r}: has values that are not finite")
-    if (largest := float(np.abs(texels).max())) > RADIANCE:
-        raise InputError(f"image {str(path)!r}: has a value of {largest:g}; at most {RADIANCE:g} is allowed")
-    return ImageTexture(read_only(texels[::-1].astype(np.float32)), alpha_cutoff, source or str(path))
+    is_float = kind in (oiio.HALF, oiio.FLOAT, oiio.DOUBLE)
+    texels = _linear_texels(np.asarray(pixels).reshape(spec.height, spec.width, -1), is_float)
+    if is_float and not np.isfinite(texels).all():
+        raise InputError(f"{what}: has values that are not finite")
+    if is_float and (largest := float(np.abs(texels).max())) > RADIANCE:
+        raise InputError(f"{what}: has a value of {largest:g}; at most {RADIANCE:g} is allowed")
+    texels.flags.writeable = False
+    return ImageTexture(texels, alpha_cutoff, source or str(path))
+
+
+def _linear_texels(pixels: NDArray[np.generic], is_float: bool) -> TexelArray:
+    """Return (h, w, 4) linear texels, bottom row first, of an image's (h, w, 1 to 4) values: bytes or float32.
+
+    Bytes are looked up, everything else is converted some rows at a time: a large texture costs its texels and little
+    more.
+    """
+    height, width, channels = pixels.shape
+    color = slice(0, 1 if channels < 3 else 3)
+    out = np.ones((height, width, 4), np.float32)
+    steps = np.arange(256) / 255
+    light, share = srgb_to_linear(steps).astype(np.float32), steps.astype(np.float32)
+    band = max(1, _BAND // width)
+    for top in range(0, height, band):
+        rows = pixels[::-1][top : top + band]
+        part = out[top : top + band]
+        if pixels.dtype == np.uint8:
+            part[..., :3] = light[rows[..., color]]
+        else:
+            part[..., :3] = rows[..., color] if is_float else srgb_to_linear(rows[..., color].astype(np.float64))
+        if channels in (2, 4):
+            part[..., 3] = share[rows[..., -1]] if pixels.dtype == np.uint8 else rows[..., -1]
+    return out
 
 
 def _first_line(errors: str) -> str:

@@ -73,7 +73,7 @@ def test_a_wheel_carries_every_module_and_data_file(wheel: Path) -> None:
     inside = set(zipfile.ZipFile(wheel).namelist())
     wanted = {f"aliasbench/{p.relative_to(ROOT).as_posix()}" for p in modules()}
     for layer in LAYERS:
-        for kind in ("*.glsl", "*.j2", "*.css", "*.js", "*.toml"):
+        for kind in ("*.glsl", "*.j2", "*.css", "*.js", "*.toml", "*.glb"):
             wanted |= {f"aliasbench/{p.relative_to(ROOT).as_posix()}" for p in (ROOT / layer).rglob(kind)}
     assert wanted <= inside
     assert not [name for name in inside if name.startswith(("tests/", "aliasbench/tests"))]

@@ -235,4 +235,4 @@ def test_the_floor_fills_the_widest_picture_below_its_far_end_and_the_horizon_sh
 def test_the_photograph_is_read_once_and_keeps_its_source_relative() -> None:
     first, second = (SCENES["brick-floor"].build().textures["brick"] for _ in range(2))
     assert first is second
-    assert getattr(first, "source", "") == "skimage/data/brick.png"
+    assert getattr(first, "source", "") == "skimage:brick.png"

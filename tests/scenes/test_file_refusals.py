@@ -1,10 +1,12 @@
 """Every way in which a scene file can be wrong is refused in one sentence: file, key, value and what is allowed."""
 
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from aliasbench.scenes.checking import check_scene_file
 from aliasbench.scenes.errors import InputError
 from aliasbench.scenes.files import load_scene
 
@@ -376,6 +378,8 @@ HUGE = {
     "quoted key": ('[texture."a\\nb"]\nx = 1', 'texture."a\\nb".x = 1: unknown key'),
     "repeated table name": (f"[{'.'.join('a' * 5000)}]\n" * 2, "not valid TOML: "),
 }
+# Cases that have two things wrong: a misspelt key is missing as well, and an image is, where only its name matters.
+MORE_THAN_ONE = {"spin key unknown": 2, "texture key unknown": 2, "quoted key": 2, "cutoff over one": 2}
 GROUPS = {"wrong": REFUSED, "out of range": OUT_OF_RANGE, "name": NAMES, "huge": HUGE}
 CASES = [(group, case) for group, cases in GROUPS.items() for case in cases]
 
@@ -393,6 +397,12 @@ def test_what_is_wrong_is_refused_with_file_key_value_and_what_is_allowed(
     assert message in said
     assert said.isprintable()
     assert len(said) < len(path) + 400
+    # Checking says the same, with its line; one thing wrong does not cause further complaints.
+    findings = check_scene_file(Path(path)).findings
+    assert len(findings) == MORE_THAN_ONE.get(case, 1)
+    assert all(finding.line is not None for finding in findings)
+    told = [form for f in findings for form in (f.text, f"line {f.line}: {f.text}", f"line {f.line}, {f.text}")]
+    assert said.removeprefix(f"{path}: ") in told
 
 
 def test_long_values_are_shortened(scene_file: Write) -> None:

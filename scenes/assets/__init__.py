@@ -1,0 +1,1 @@
+"""Model files of the project's own, and the scripts that make them."""

@@ -1,0 +1,237 @@
+"""OBJ and PLY files become what they say, in every form they are written in; damaged ones are refused with the line."""
+
+import struct
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from aliasbench.scenes.errors import InputError
+from aliasbench.scenes.files import load_scene
+from aliasbench.scenes.meshes import load_mesh
+from aliasbench.scenes.textures import evaluate_point, srgb_to_linear
+
+HEAD = """ply
+format {format} 1.0
+comment two faces
+element vertex 4
+property float x
+property float y
+property double z
+{extra}element face {faces}
+property uchar flags
+property list {count} int vertex_indices
+property list uchar float texcoord
+end_header
+"""
+POINTS = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 2)]
+
+
+def ply(order: str, faces: list[list[int]], count: str = "uchar", colors: bool = False) -> bytes:
+    """Return a PLY file in an order: ``<``, ``>`` or empty for ascii."""
+    extra = "property uchar red\nproperty uchar green\nproperty uchar blue\n" if colors else ""
+    name = {"<": "binary_little_endian", ">": "binary_big_endian", "": "ascii"}[order]
+    head = HEAD.format(format=name, extra=extra, faces=len(faces), count=count).encode()
+    color = (255, 0, 51) if colors else ()
+    if not order:
+        lines = [" ".join(map(str, (*p, *color))) for p in POINTS]
+        lines += [" ".join(map(str, (7, len(f), *f, 2, 0.5, 0.5))) for f in faces]
+        return head + "\n".join(lines).encode() + b"\n"
+    body = b"".join(struct.pack(f"{order}ffd{len(color)}B", *p, *color) for p in POINTS)
+    kind = {"uchar": "B", "int": "i"}[count]
+    for f in faces:
+        body += struct.pack(f"{order}B{kind}{len(f)}iBff", 7, len(f), *f, 2, 0.5, 0.5)
+    return head + body
+
+
+@pytest.mark.parametrize("order", ["<", ">", ""])
+@pytest.mark.parametrize("count", ["uchar", "int"])
+@pytest.mark.parametrize(
+    ("faces", "wanted"),
+    [
+        ([[0, 1, 2], [0, 2, 3]], [[0, 1, 2], [0, 2, 3]]),
+        ([[0, 1, 2, 3]], [[0, 1, 2], [0, 2, 3]]),
+        ([[0, 1, 2, 3], [1, 2, 3], [0, 1]], [[1, 2, 3], [0, 1, 2], [0, 2, 3]]),
+    ],
+)
+def test_every_form_of_ply_gives_the_same_faces(
+    tmp_path: Path, order: str, count: str, faces: list[list[int]], wanted: list[list[int]]
+) -> None:
+    (tmp_path / "a.ply").write_bytes(ply(order, faces, count))
+    (surface,) = load_mesh(tmp_path / "a.ply").surfaces
+    assert surface.vertices.tolist() == [list(map(float, p)) for p in POINTS]
+    assert surface.triangles.tolist() == wanted
+    assert surface.texture is None
+
+
+@pytest.mark.parametrize("order", ["<", ">", ""])
+def test_colours_of_bytes_are_srgb(tmp_path: Path, order: str) -> None:
+    (tmp_path / "a.ply").write_bytes(ply(order, [[0, 1, 2]], colors=True))
+    (surface,) = load_mesh(tmp_path / "a.ply").surfaces
+    assert surface.color == pytest.approx(srgb_to_linear(np.array([255, 0, 51]) / 255).tolist())
+
+
+@pytest.mark.parametrize("encoding", ["binary_little_endian", "ascii"])
+def test_a_ply_is_what_trimesh_wrote(tmp_path: Path, encoding: str) -> None:
+    ball = trimesh.creation.icosphere(subdivisions=2)
+    (tmp_path / "ball.ply").write_bytes(trimesh.exchange.ply.export_ply(ball, encoding=encoding))
+    (surface,) = load_mesh(tmp_path / "ball.ply").surfaces
+    np.testing.assert_array_equal(surface.triangles, ball.faces)
+    np.testing.assert_allclose(surface.vertices, ball.vertices, atol=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        (b"", "has no PLY header"),
+        (b"ply\nformat ascii 1.0\nelement vertex 1\n", "has no PLY header"),
+        (b"ply\nformat ascii 2.0\nend_header\n", "line 2: 'format ascii 2.0' is no line of a PLY 1.0 header"),
+        (b"ply\nelement vertex -1\nend_header\n", "line 2: 'element vertex -1' is no line"),
+        (b"ply\nend_header\n", "has no format line"),
+        (b"ply\nformat ascii 1.0\nend_header\n", "has no vertices with x, y and z"),
+        (ply("<", [[0, 1, 2]])[:-30], "has not the"),
+        (ply("<", [[0, 1, 2], [0, 1, 2, 3]])[:-9], "has not the 2 elements 'face' that its header says (cut off?)"),
+        (ply("", [[0, 1, 2]])[:-12], "has not the 1 elements 'face'"),
+        (ply("", [[0, 1, 2]]).replace(b"7 3", b"7 x"), "something other than numbers"),
+        (ply("", [[0, 1, 2]]).replace(b"vertex 4", b"vertex 99999999"), "element vertex has a count of 99999999"),
+        (ply("<", [[0, 1, 4]]), "index 4 has no vertex; there are 4 vertices"),
+        (ply("<", [[0, 1, -2]]), "index -1 has no vertex"),
+        (ply("", [[0, 1, 2]]).replace(b"1 1 0", b"1 nan 0"), "mesh: vertex 2 is [1.0, nan, 0.0]; finite numbers"),
+        (ply("<", [[0, 1, 1]]), "has no triangle with an area"),
+        (ply("<", []), "has no triangle with an area"),
+    ],
+)
+def test_damaged_ply_files_are_refused(tmp_path: Path, data: bytes, message: str) -> None:
+    (tmp_path / "a.ply").write_bytes(data)
+    with pytest.raises(InputError) as caught:
+        load_scene(str(tmp_path / "a.ply"))
+    assert message in str(caught.value)
+    assert str(caught.value).startswith(str(tmp_path / "a.ply"))
+
+
+OBJ = """# a square
+mtllib a.mtl
+v 0 0 0
+v 1 0 0
+v 1 1 0
+v 0 1 0
+vt 0 0
+vt 1 0
+vt 1 1
+vt 0 1
+vn 0 0 1
+usemtl pic
+f {}
+"""
+MTL = "newmtl pic\nKd 0.5 1 1\nmap_Kd {}\nnewmtl plain\nKd 0.25 0.5 0.75\n"
+PPM = b"P6 2 2 255\n" + bytes([255, 0, 0, 0, 255, 0, 0, 0, 255, 255, 255, 255])  # top row first
+
+
+def obj(folder: Path, text: str, mtl: str | None = None) -> Path:
+    (folder / "a.obj").write_text(text)
+    (folder / "a.mtl").write_text(MTL.format("a.ppm") if mtl is None else mtl)
+    (folder / "a.ppm").write_bytes(PPM)
+    return folder / "a.obj"
+
+
+@pytest.mark.parametrize("face", ["1/1 2/2 3/3 4/4", "1/1/1 2/2/1 3/3/1 4/4/1", "-4/-4 -3/-3 -2/-2 -1/-1"])
+def test_an_obj_has_its_texture_upright_times_its_colour(tmp_path: Path, face: str) -> None:
+    model = load_mesh(obj(tmp_path, OBJ.format(face)))
+    (surface,) = model.surfaces
+    assert surface.color == (0.5, 1.0, 1.0)
+    assert surface.texture == "a.obj#a.ppm"
+    assert surface.uv is not None
+    assert len(surface.triangles) == 2
+    corner = {tuple(p): uv for p, uv in zip(surface.vertices.tolist(), surface.uv, strict=True)}
+    assert corner[(0.0, 0.0, 0.0)].tolist() == [0, 0]
+    assert corner[(1.0, 1.0, 0.0)].tolist() == [1, 1]
+    seen = [evaluate_point(model.textures["a.obj#a.ppm"], np.array(uv))[:3].tolist() for uv in ((0.2, 0.8), (0.2, 0.2))]
+    assert seen == [[1, 0, 0], [0, 0, 1]]
+
+
+def test_parts_of_an_obj_have_their_materials(tmp_path: Path) -> None:
+    text = OBJ.format("1/1 2/2 3/3") + "usemtl plain\nf 1//1 3//1 4//1\nf 1 2 4\nusemtl pic\nf 1/1 3/3 4/4\n"
+    surfaces = load_mesh(obj(tmp_path, text)).surfaces
+    assert [(s.color, s.texture, len(s.triangles)) for s in surfaces] == [
+        ((0.5, 1.0, 1.0), "a.obj#a.ppm", 2),
+        ((0.25, 0.5, 0.75), None, 2),
+    ]
+    assert [s.name for s in surfaces] == ["a.obj#0", "a.obj#1"]
+
+
+def test_an_obj_is_what_trimesh_reads(tmp_path: Path) -> None:
+    ball = trimesh.creation.icosphere(subdivisions=2)
+    (tmp_path / "ball.obj").write_text(trimesh.exchange.obj.export_obj(ball, include_normals=True, digits=12))
+    (surface,) = load_mesh(tmp_path / "ball.obj").surfaces
+    np.testing.assert_allclose(surface.vertices[surface.triangles], ball.triangles, atol=1e-11)
+
+
+@pytest.mark.parametrize(
+    ("text", "mtl", "message"),
+    [
+        ("", None, "has no vertices (lines 'v x y z')"),
+        ("v 1 2\nf 1 1 1", None, "a line 'v' has 2 numbers; 3 or 4 or 6 are needed"),
+        ("v 1 2 x\nf 1 1 1", None, "lines 'v': has something other than numbers"),
+        (OBJ.format("1/1 2/2"), None, "line 13: a face of 2 corners; 3 at least are needed"),
+        (OBJ.format("1/1 2/2 9/3"), None, "line 13: there is no vertex 9; there are 4"),
+        (OBJ.format("1/1 2/2 0/3"), None, "line 13: there is no vertex 0"),
+        (OBJ.format("1/1 2/2 3/-9"), None, "line 13: there is no texture coordinate -9"),
+        (OBJ.format("1/1 2/2 3/x"), None, "is no corner of a face; v, v/vt, v//vn and v/vt/vn are"),
+        (OBJ.format("1/1 2/2 1/2/3/4"), None, "1/2/3/4' is no corner"),
+        (OBJ.format("1/1 2/2 " + "1" * 60), None, "is no corner of a face"),
+        (OBJ.format("1 2 3"), None, "line 13: a face with a textured material needs texture coordinates (vt)"),
+        (
+            OBJ.format("1/1 2/2 3/3").replace("usemtl pic", "usemtl pik"),
+            None,
+            "unknown material 'pik'; did you mean 'pic'",
+        ),
+        (OBJ.format("1/1 2/2 3/3").replace("a.mtl", "b.mtl"), None, "mtllib: 'b.mtl': no such file"),
+        (OBJ.format("1/1 2/2 3/3").replace("a.mtl", "../a.mtl"), None, "'../a.mtl' leads out of the folder"),
+        (OBJ.format("1/1 2/2 3/3"), MTL.format("gone.png"), "map_Kd: image 'gone.png': no such file"),
+        (OBJ.format("1/1 2/2 3/3"), MTL.format("http://x.org/a.png"), "is no local file"),
+        (OBJ.format("1/1 2/2 3/3"), MTL.format("C:\\\\a.png"), "is no local file"),
+        (OBJ.format("1/1 2/2 3/3"), MTL.format("-s 2 2 a.ppm"), "map_Kd has options"),
+        (OBJ.format("1/1 2/2 3/3"), MTL.replace("0.5 1 1", "-1 0 0").format("a.ppm"), "Kd must be three numbers"),
+        (
+            OBJ.format("1/1 2/2 3/3").replace("v 1 1 0", "v nan 1 0"),
+            None,
+            "vertex 2 is [nan, 1.0, 0.0]; finite numbers",
+        ),
+    ],
+)
+def test_damaged_obj_files_are_refused(tmp_path: Path, text: str, mtl: str | None, message: str) -> None:
+    with pytest.raises(InputError) as caught:
+        load_scene(str(obj(tmp_path, text, mtl)))
+    assert message in str(caught.value)
+    assert str(caught.value).startswith(str(tmp_path / "a.obj"))
+
+
+def test_a_mesh_in_a_scene_file_takes_what_the_object_says(tmp_path: Path) -> None:
+    obj(tmp_path, OBJ.format("1/1 2/2 3/3 4/4"))
+    file = tmp_path / "s.toml"
+    file.write_text('[[object]]\nmesh = "a.obj"\ncolor = [0.5, 0.5, 2]\nvelocity = [1, 0, 0]\n')
+    scene = load_scene(str(file))
+    (surface,) = scene.objects
+    assert surface.color == (0.25, 0.5, 2.0)
+    assert surface.motion.velocity == (1.0, 0.0, 0.0)
+    assert list(scene.textures) == ["a.obj#a.ppm"]
+    file.write_text('[[object]]\nmesh = "a.obj"\ntexture = "c"\n[texture.c]\nchecker = { squares = [2, 2] }\n')
+    scene = load_scene(str(file))
+    assert (scene.objects[0].texture, list(scene.textures)) == ("c", ["c"])
+    file.write_text('[[object]]\nmesh = "a.obj"\nuv = [[0, 0]]\n')
+    with pytest.raises(InputError, match=r"object\[0\]\.uv = .*must be left out: a mesh has its own"):
+        load_scene(str(file))
+    (tmp_path / "b.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    file.write_text('[[object]]\nmesh = "b.obj"\ntexture = "c"\n[texture.c]\nchecker = { squares = [2, 2] }\n')
+    with pytest.raises(InputError, match=r"object\[0\]\.texture: 'b.obj' has parts without texture coordinates"):
+        load_scene(str(file))
+
+
+def test_only_known_kinds_of_model_files_are_read(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"unknown kind of model file '.stl'.*known: .glb, .gltf, .obj, .ply"):
+        load_mesh(tmp_path / "a.stl")
+    for name in ("a.glb", "a.obj", "a.ply"):
+        (tmp_path / name).mkdir()
+        with pytest.raises(InputError, match=f"{name}: not a regular file"):
+            load_scene(str(tmp_path / name))
