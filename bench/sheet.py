@@ -1,7 +1,8 @@
 """A contact sheet: every scene point sampled by both renderers beside its reference, to see what each scene shows.
 
 Pictures stand at their own pixels, never resized: a resized picture of aliasing shows the resizing. What a renderer
-cannot draw is a grey field with the reason in it, so that the sheet says what is missing and why.
+cannot draw is a grey field with the reason in it, so that the sheet says what is missing and why. What strobes shows
+in time alone: under a scene with a rotor stands a film of its first frames.
 """
 
 import io
@@ -32,6 +33,7 @@ COLUMNS = (
     ("raster:", "rasterizer, 1 sample"),
     ("reference:", "reference"),
 )
+FILM = 8  # frames of a film
 LEAST_SIDE, MOST_SIDE = 16, 1024  # pixels of a picture
 OVERVIEW_WIDTH = 1700  # pixels: as many scenes stand side by side as fit
 MARGIN, LINE = 10, 18  # pixels around things, and of a line of text
@@ -52,12 +54,13 @@ class Panel:
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One scene of a sheet."""
+    """One scene of a sheet; `film` has its first frames side by side, point sampled, or is empty."""
 
     scene: str
     summary: str
     image: str
     panels: Sequence[Panel]
+    film: Sequence[Pixels] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,7 +131,8 @@ def make_sheet(
             step = number * len(COLUMNS) + place
             on_step(f"[{step}/{len(scenes) * len(COLUMNS)}] {scene.name} by {technique}")
             panels.append(_draw(scene, technique, title, size, frame))
-        rows.append(Row(scene.name, _summary(scene), _free_name(scene.name, taken), panels))
+        film = _draw_film(scene, size, frame) if scene.facts.rotors else ()
+        rows.append(Row(scene.name, _summary(scene), _free_name(scene.name, taken), panels, film))
     contents = {row.image: _png(_paste_rows([row], size, columns=1)) for row in rows}
     width = 2 * MARGIN + _row_width(size)
     contents["overview.png"] = _png(_paste_rows(rows, size, columns=max(1, OVERVIEW_WIDTH // width)))
@@ -146,8 +150,24 @@ def _draw(scene: Scene, technique: str, title: str, size: tuple[int, int], numbe
     except (UnsupportedScene, InputError) as error:
         return Panel(technique, title, None, "", str(error))
     known = "" if frame.uncertainty is None else f", {certainty(frame.uncertainty, frame.uncertainty_kind)}"
-    pixels = np.rint(linear_to_srgb(frame.pixels) * 255).astype(np.uint8)
-    return Panel(technique, title, pixels, f"{duration(frame.seconds)}{known}")
+    return Panel(technique, title, _bytes(frame.pixels), f"{duration(frame.seconds)}{known}")
+
+
+def _draw_film(scene: Scene, size: tuple[int, int], first: int) -> list[Pixels]:
+    """Return the ray tracer's point samples of `FILM` frames, small enough to stand in one row."""
+    from aliasbench.renderers import catalog
+
+    width = (_row_width(size) - (FILM - 1) * MARGIN) // FILM
+    small = (max(1, width), max(1, round(width * size[1] / size[0])))
+    try:
+        with catalog.prepare(scene, COLUMNS[0][0], size=small) as prepared:
+            return [_bytes(prepared.render(frame=first + n, seed=0).pixels) for n in range(FILM)]
+    except (UnsupportedScene, InputError):
+        return []  # the panel of this renderer says why
+
+
+def _bytes(pixels: NDArray[np.floating]) -> Pixels:
+    return np.rint(linear_to_srgb(pixels) * 255).astype(np.uint8)
 
 
 def _summary(scene: Scene) -> str:
@@ -173,14 +193,23 @@ def _paste_rows(rows: Sequence[Row], size: tuple[int, int], *, columns: int) -> 
     from PIL import Image
 
     columns = min(columns, max(1, len(rows)))
-    cell = (_row_width(size) + 2 * MARGIN, size[1] + 2 * LINE + 2 * MARGIN)
+    width = _row_width(size) + 2 * MARGIN
     down = -(-len(rows) // columns)
-    image = Image.new("RGB", (columns * cell[0], max(1, down) * cell[1]), PAPER)
-    for number, row in enumerate(rows):
-        # Down the columns: the catalog's order is read in them.
-        column, line = divmod(number, down)
-        _paste_row(image, row, (column * cell[0] + MARGIN, line * cell[1] + MARGIN), size)
+    # Down the columns: the catalog's order is read in them.
+    stacks = [rows[k * down : (k + 1) * down] for k in range(columns)]
+    heights = [sum(_row_height(row, size) for row in stack) for stack in stacks]
+    image = Image.new("RGB", (columns * width, max([1, *heights])), PAPER)
+    for column, stack in enumerate(stacks):
+        top = 0
+        for row in stack:
+            _paste_row(image, row, (column * width + MARGIN, top + MARGIN), size)
+            top += _row_height(row, size)
     return image
+
+
+def _row_height(row: Row, size: tuple[int, int]) -> int:
+    film = LINE + MARGIN + row.film[0].shape[0] if row.film else 0
+    return size[1] + 2 * LINE + 2 * MARGIN + film
 
 
 def _paste_row(image: "Image", row: Row, corner: tuple[int, int], size: tuple[int, int]) -> None:
@@ -192,20 +221,29 @@ def _paste_row(image: "Image", row: Row, corner: tuple[int, int], size: tuple[in
     draw.text((x, y), _fitted(printable(row.scene), large, _row_width(size)), INK, large)
     for place, panel in enumerate(row.panels):
         left, top = x + place * (size[0] + MARGIN), y + 2 * LINE
-        draw.text((left, top - LINE), _fitted(panel.title, small, size[0]), INK, small)
+        draw.text((left, top - LINE), _fitted(_spaced(panel.title), small, size[0]), INK, small)
         if panel.pixels is not None:
             image.paste(Image.fromarray(panel.pixels), (left, top))
             continue
         draw.rectangle((left, top, left + size[0] - 1, top + size[1] - 1), fill=GREY)
         text = textwrap.fill(printable(panel.reason or ""), max(8, size[0] // 7))
         lines = text.splitlines()[: max(1, (size[1] - 12) // 15)]
-        draw.multiline_text((left + 6, top + 6), "\n".join(lines), INK, small, spacing=3)
+        draw.multiline_text((left + 6, top + 6), _spaced("\n".join(lines)), INK, small, spacing=3)
+    if row.film:
+        top = y + 2 * LINE + size[1] + MARGIN
+        draw.text((x, top), _spaced(f"{COLUMNS[0][1]}, {FILM} frames in turn"), INK, small)
+        for number, pixels in enumerate(row.film):
+            image.paste(Image.fromarray(pixels), (x + number * (pixels.shape[1] + MARGIN), top + LINE))
 
 
 def _font(size: int) -> "FreeTypeFont | ImageFont":
     from PIL import ImageFont
 
     return ImageFont.load_default(size)
+
+
+def _spaced(text: str) -> str:
+    return text.replace(" ", "  ")  # small, the font's single space can hardly be seen
 
 
 def _fitted(text: str, font: "FreeTypeFont | ImageFont", width: int) -> str:

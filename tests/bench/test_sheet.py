@@ -1,5 +1,6 @@
 """The contact sheet: pictures at their own pixels, reasons where there are none, and a page that shows all."""
 
+import itertools
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -8,7 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from aliasbench.bench.sheet import COLUMNS, LINE, MARGIN, make_sheet
+from aliasbench.bench.sheet import COLUMNS, FILM, LINE, MARGIN, make_sheet
 from aliasbench.renderers.technique import parse_technique
 from aliasbench.scenes.catalog import SCENES
 from aliasbench.scenes.errors import InputError, UnsupportedScene
@@ -120,3 +121,15 @@ def test_real_renderers_draw_on_it(tmp_path: Path) -> None:
     assert "certified to" in sheet.rows[0].panels[2].note
     with pytest.raises(InputError, match="size 15x24: width must be"):
         make_sheet([], tmp_path, size=(15, 24))
+
+
+def test_what_turns_has_a_film_of_its_first_frames(tmp_path: Path) -> None:
+    still, film = make_sheet(["edge-fan", "propeller:rev_per_s=30"], tmp_path, size=SIZE).rows
+    assert still.film == ()
+    assert len(film.film) == FILM
+    assert all(np.array_equal(pixels, film.film[0]) for pixels in film.film), "it stands still"
+    assert film.film[0].std() > 20
+    with Image.open(tmp_path / "edge-fan.png") as short, Image.open(tmp_path / film.image) as long:
+        assert long.height - short.height == LINE + MARGIN + film.film[0].shape[0]
+    turning = make_sheet(["propeller"], tmp_path, size=SIZE).rows[0].film
+    assert not any(np.array_equal(a, b) for a, b in itertools.pairwise(turning))
