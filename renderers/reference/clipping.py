@@ -16,6 +16,7 @@ PLANES = 5
 # The near plane's depth over the largest camera coordinate. Nothing divides by the depth of parallel rays, and what
 # lies in the camera's own plane is seen: rounding must not take it for behind.
 NEAR_PERSPECTIVE, NEAR_PARALLEL = 1e-15, -1e-14
+ONE_CORNER = 4 * 2.0**-52  # corners this near, over the width of the picture, are one up to rounding
 
 
 @njit(cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
@@ -46,6 +47,43 @@ def cut_polygon(
             out[size, 4] = 0.0 if da >= 0.0 else a[4]
             size += 1
     return size
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def merge_corners(points: FloatArray, n: int, close: float, kept: IntArray) -> int:
+    """Join corners of a loop that are one up to rounding, as cuts near a corner of the picture leave.
+
+    An edge of no length has no direction, and no half plane. Joined corners take the first in the order of x, then y,
+    of theirs, so that neighbours agree. Returns how many are left; `kept[i]` becomes the number of the corner whose
+    following edge is now edge i.
+    """
+    size = 0
+    for i in range(n):
+        same = False
+        if size > 0:
+            k = size - 1
+            same = abs(points[i, 0] - points[k, 0]) <= close and abs(points[i, 1] - points[k, 1]) <= close
+        if same:
+            _take_first(points, size - 1, i)
+            kept[size - 1] = i
+        else:
+            points[size, 0], points[size, 1] = points[i, 0], points[i, 1]
+            kept[size] = i
+            size += 1
+    while size > 1:
+        k = size - 1
+        if abs(points[k, 0] - points[0, 0]) > close or abs(points[k, 1] - points[0, 1]) > close:
+            break
+        _take_first(points, 0, k)
+        size -= 1
+    return size
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _take_first(points: FloatArray, k: int, i: int) -> None:
+    ahead = points[i, 0] < points[k, 0] or (points[i, 0] == points[k, 0] and points[i, 1] < points[k, 1])
+    if ahead:
+        points[k, 0], points[k, 1] = points[i, 0], points[i, 1]
 
 
 @njit(cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)

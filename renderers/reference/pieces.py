@@ -18,12 +18,14 @@ from numpy.typing import NDArray
 from aliasbench.renderers.reference.clipping import (
     NEAR_PARALLEL,
     NEAR_PERSPECTIVE,
+    ONE_CORNER,
     PLANES,
     cross,
     cut_polygon,
     dot,
     face_planes,
     inside_plane,
+    merge_corners,
     minus,
 )  # fmt: skip
 from aliasbench.renderers.reference.faces import Faces
@@ -162,6 +164,8 @@ def _clip_project(
 ) -> tuple[int, int]:  # fmt: skip
     """Fill the output arrays; return the numbers of corners and pieces."""
     k, m = 0, 0
+    close = ONE_CORNER * 2.0 * max(cx, cy)
+    edge = np.empty(work.shape[1], np.int64)
     for f in range(len(first) - 1):
         n = first[f + 1] - first[f]
         now = 0
@@ -193,6 +197,13 @@ def _clip_project(
             points[k + i, 0] = cx + p[i, 0] * s
             points[k + i, 1] = cy - p[i, 1] * s
         for i in range(n):
+            edge[i] = i
+        whole = n
+        if slice_length == 0.0:
+            n = merge_corners(points[k : k + n], n, close, edge)
+            if n < 3:
+                continue
+        for i in range(n):
             j = (i + 1) % n
             ax, ay = points[k + i, 0] - points[k, 0], points[k + i, 1] - points[k, 1]
             bx, by = points[k + j, 0] - points[k, 0], points[k + j, 1] - points[k, 1]
@@ -201,9 +212,9 @@ def _clip_project(
             if not opens:
                 continue
             planes[m] = np.nan
-        for i in range(n):
-            j = (i + 1) % n
-            outlined[k + i] = p[i, 4] != 0.0
+        for c in range(n):
+            i, j = edge[c], (edge[c] + 1) % whole
+            outlined[k + c] = p[i, 4] != 0.0
             if perspective:
                 # over the whole slice: the depth may shrink by what the speed allows in half of it
                 v = max(p[i, 3], p[j, 3])
@@ -214,9 +225,9 @@ def _clip_project(
                 bound = 0.0
                 if v > 0.0:
                     bound = 1.1 * scale * v * np.sqrt(wide) / z if z > 0.0 else np.inf
-                reach[k + i] = bound
+                reach[k + c] = bound
             else:
-                reach[k + i] = scale * max(p[i, 3], p[j, 3])
+                reach[k + c] = scale * max(p[i, 3], p[j, 3])
         if area < 0.0:
             _reverse(points[k : k + n], reach[k : k + n], outlined[k : k + n], n)
         kept[m] = f

@@ -14,9 +14,11 @@ from numpy.typing import NDArray
 from aliasbench.renderers.reference.clipping import (
     NEAR_PARALLEL,
     NEAR_PERSPECTIVE,
+    ONE_CORNER,
     PLANES,
     cross,
     cut_polygon,
+    merge_corners,
     minus,
     nearness_plane,
     to_picture,
@@ -150,6 +152,8 @@ def place_faces(movers: Movers, faces: IntArray, count: int, time: float, room: 
     near, half = camera[24], camera[25:27]
     scale, cx, cy = camera[27], camera[28], camera[29]
     k, m, last = 0, 0, -1
+    close = ONE_CORNER * 2.0 * max(cx, cy)
+    edge = np.empty(work.shape[1], np.int64)
     starts[0] = 0
     for a in range(count):
         f = faces[a]
@@ -190,6 +194,7 @@ def place_faces(movers: Movers, faces: IntArray, count: int, time: float, room: 
             s = scale / p[i, 2] if perspective else scale
             points[k + i, 0] = cx + p[i, 0] * s
             points[k + i, 1] = cy - p[i, 1] * s
+        n = merge_corners(points[k : k + n], n, close, edge)
         for i in range(1, n - 1):
             ax, ay = points[k + i, 0] - points[k, 0], points[k + i, 1] - points[k, 1]
             bx, by = points[k + i + 1, 0] - points[k, 0], points[k + i + 1, 1] - points[k, 1]

@@ -22,6 +22,7 @@ import numpy as np
 from aliasbench.renderers.frame import Frame
 from aliasbench.renderers.reference.averaged import average
 from aliasbench.renderers.reference.cache import Stored, fetch
+from aliasbench.renderers.reference.constant_uv import paint_constant
 from aliasbench.renderers.reference.cutouts import expand
 from aliasbench.renderers.reference.defocus import draw_layers, is_in_focus
 from aliasbench.renderers.reference.faces import Faces, build_faces
@@ -32,10 +33,10 @@ from aliasbench.renderers.reference.snapshots import FlatPictures, LitPictures, 
 from aliasbench.renderers.sampling.filters import FilterSpec, filter_of
 from aliasbench.renderers.technique import Technique
 from aliasbench.scenes.errors import UnsupportedScene
-from aliasbench.scenes.model import Scene, content_digest
+from aliasbench.scenes.model import Checker, ImageTexture, Scene, ZonePlate, content_digest
 from aliasbench.scenes.projection import view_at
 
-ALGORITHM = 5  # changes with anything that changes a reference's pixels: stored ones are not used then
+ALGORITHM = 6  # changes with anything that changes a reference's pixels: stored ones are not used then
 _WIDE = 1e-3  # a bound beyond which sampling may do better
 
 
@@ -43,7 +44,8 @@ _WIDE = 1e-3  # a bound beyond which sampling may do better
 class PreparedReference:
     """A scene ready for its references; see `renderers.frame.Prepared`.
 
-    `scene` is as given; `drawn` has its cut-outs as geometry, and is None where that cannot be.
+    `scene` is as given, but for triangles of one texture coordinate (see `constant_uv`); `drawn` has its cut-outs as
+    geometry, and is None where that cannot be.
     """
 
     scene: Scene
@@ -64,6 +66,7 @@ class PreparedReference:
             stored = self._at_once(shown)
         else:
             stored = fetch(self.key(shown), lambda: self._make(shown))
+        self._check(stored)
         return Frame(
             pixels=stored.pixels,
             seconds=time.perf_counter() - start,
@@ -72,6 +75,19 @@ class PreparedReference:
             uncertainty=stored.uncertainty,
             uncertainty_kind="confidence" if stored.samples else "bound",
         )
+
+    def _check(self, stored: Stored) -> None:
+        """Raise for a picture that cannot be: a wrong truth must not pass for one."""
+        has_lobes = self.spec.name in ("mitchell", "lanczos")
+        most = np.inf if self.scene.lights or has_lobes else _brightest(self.scene)
+        least = -np.inf if has_lobes else 0.0
+        slack = stored.uncertainty + 1e-9 * (most if np.isfinite(most) else 1.0)
+        low, high = float(np.min(stored.pixels)), float(np.max(stored.pixels))
+        if not (np.isfinite([low, high]).all() and low >= least - slack and high <= most + slack):
+            raise UnsupportedScene(
+                f"reference: {self.scene.name}: rounding errors make its picture impossible (values from {low:g} to "
+                f"{high:g}); a scene of less extreme sizes or texture coordinates is needed"
+            )
 
     def key(self, frame: int) -> str:
         """Return the name under which a frame's reference is stored."""
@@ -194,6 +210,7 @@ def prepare_reference(scene: Scene, technique: Technique, size: tuple[int, int])
     start = time.perf_counter()
     spec = filter_of(technique)
     _refuse_missing(scene)
+    scene = paint_constant(scene, linear=technique.texture == "linear")
     drawn = expand(scene, linear=technique.texture == "linear")
     if drawn is None and scene.lights:
         raise UnsupportedScene(
@@ -205,6 +222,22 @@ def prepare_reference(scene: Scene, technique: Technique, size: tuple[int, int])
     wide_view(view_at(scene.camera, scene.animation, 0, 0.0, size), spec)
     seconds = time.perf_counter() - start
     return PreparedReference(scene, drawn, technique, spec, size, build_faces(shown), paths, seconds)
+
+
+def _brightest(scene: Scene) -> float:
+    """Return the largest value that anything of an unlit scene shows."""
+    values = [max(scene.background)]
+    for surface in scene.objects:
+        texture = scene.textures[surface.texture] if surface.texture is not None else None
+        if texture is None or isinstance(texture, ZonePlate):
+            shown = 1.0
+        elif isinstance(texture, ImageTexture):
+            shown = float(texture.texels[..., :3].max())
+        else:
+            ends = (texture.black, texture.white) if isinstance(texture, Checker) else (texture.low, texture.high)
+            shown = float(np.max(ends))
+        values.append(max(surface.color) * shown)
+    return max(values)
 
 
 def _refuse_missing(scene: Scene) -> None:

@@ -1,0 +1,137 @@
+"""Faces that leave a reference no digits to spare: edges through the corners of its window, textures without a map."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from aliasbench.renderers.catalog import render
+from aliasbench.renderers.reference import reference
+from aliasbench.renderers.reference.constant_uv import paint_constant
+from aliasbench.scenes.errors import UnsupportedScene
+from aliasbench.scenes.files import load_scene
+from aliasbench.scenes.model import Camera, Checker, ImageTexture, Motion, Scene, read_only
+from aliasbench.scenes.shapes import mesh, polygon
+
+FLAT = Camera("orthographic", height=2.0)
+SIZES = [(8, 8), (64, 64), (100, 100), (37, 37)]
+
+
+@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize("up", [1, -1])
+@pytest.mark.parametrize("ulps", [0, 1, -3])
+def test_a_half_plane_along_the_diagonal_fills_half(size, up, ulps):
+    # its edge passes through two corners of the window that references cut everything to, or an ulp beside
+    nudge = ulps * 2.0**-52
+    half_plane = polygon([(-9, -9 * up + nudge, 0), (9, 9 * up, 0), (-9, 9 * up, 0)])
+    pixels = render(Scene("diagonal", FLAT, (half_plane,)), "reference:", size=size).pixels[..., 0]
+    row, column = np.indices(size[::-1])
+    place = column + row - (size[0] - 1) if up > 0 else column - row
+    expected = np.where(place == 0, 0.5, np.where(place < 0, 1.0, 0.0))
+    np.testing.assert_allclose(pixels, expected, atol=1e-12)
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_a_triangle_with_a_side_through_a_corner_of_the_window_keeps_its_area(size):
+    triangle = mesh([(2, -2, 0), (0.5, 2, 0), (-2, 2, 0)], [[0, 1, 2]])
+    pixels = render(Scene("t", FLAT, (triangle,)), "reference:", size=size).pixels[..., 0]
+    truth = render(
+        Scene("t", FLAT, (mesh([(2, -2, 0), (0.5 + 1e-15, 2 + 1e-15, 0), (-2 - 1e-15, 2, 0)], [[0, 1, 2]]),)),
+        "raytrace:spp=256,sampler=jittered", size=size,
+    ).pixels[..., 0]  # fmt: skip
+    assert pixels.mean() == pytest.approx(float(truth.mean()), abs=1e-3)
+    assert np.abs(pixels - truth).max() < 0.05
+
+
+def test_moving_edges_through_corners_of_the_window_agree_with_instants():
+    scene = load_scene("near-horizontal-edge:slope=-1,speed=2,shutter=1")
+    shown = render(scene, "reference:", size=(16, 16), frame=3).pixels
+    # over the shutter the edge moves by 16/30 pixels: each pixel's mean over time is a cubic, exact in 4 Gauss nodes
+    # on each side of where its corners are crossed; sampled here at 64 midpoints, an error below 1/64^2
+    parts = []
+    for k in range(64):
+        still = dataclasses.replace(
+            scene, animation=dataclasses.replace(scene.animation, shutter=0.0),
+            objects=tuple(_moved(o, (3 + (k + 0.5) / 64) / scene.animation.fps) for o in scene.objects),
+        )  # fmt: skip
+        parts.append(render(still, "reference:", size=(16, 16)).pixels)
+    np.testing.assert_allclose(shown, np.mean(parts, axis=0), atol=1 / 64**2 + 1e-5)
+
+
+def _moved(surface, time):
+    move = np.asarray(surface.motion.velocity) * time
+    return dataclasses.replace(surface, vertices=read_only(surface.vertices + move), motion=Motion())
+
+
+@pytest.mark.parametrize("truth", ["point", "linear"])
+@pytest.mark.parametrize("projection", ["orthographic", "perspective"])
+def test_triangles_of_one_texture_coordinate_are_flat_coloured(palette_scene, truth, projection):
+    scene, colors = palette_scene(projection, truth == "linear")
+    plain = dataclasses.replace(
+        scene,
+        objects=tuple(
+            mesh(s.vertices[t], [[0, 1, 2]], color=tuple(c))
+            for s in scene.objects for t, c in zip(s.triangles, colors, strict=True)
+        ),
+        textures={},
+    )  # fmt: skip
+    for technique in (f"reference:texture={truth}", f"reference:texture={truth},filter=gaussian"):
+        shown, same = (render(s, technique, size=(24, 20)) for s in (scene, plain))
+        assert shown.uncertainty_kind == "bound"
+        np.testing.assert_allclose(shown.pixels, same.pixels, atol=1e-11)
+        assert shown.pixels.std() > 0.05
+
+
+@pytest.fixture
+def palette_scene():
+    def make(projection, blend):
+        rng = np.random.default_rng(5)
+        vertices = rng.uniform(-1, 1, (24, 3)) * [1, 1, 0.3]
+        uv = np.repeat(rng.uniform(-2, 2, (8, 2)), 3, axis=0)
+        texels = rng.uniform(0, 1, (3, 4, 4)).astype(np.float32)
+        texels[..., 3] = 1.0
+        bare = mesh(vertices, np.arange(24).reshape(8, 3))
+        surface = dataclasses.replace(bare, uv=read_only(uv), texture="palette")
+        camera = FLAT if projection == "orthographic" else Camera("perspective", fov_y_deg=30.0)
+        scene = Scene("palette", camera, (surface,), {"palette": ImageTexture(read_only(texels))})
+        u, v = (uv[::3] * [4, 3] - (0.5 if blend else 0.0)).T
+        k, r = np.floor(u).astype(int), np.floor(v).astype(int)
+        if not blend:
+            return scene, texels[r % 3, k % 4, :3].astype(float)
+        a, b = (u - k)[:, None], (v - r)[:, None]
+        rows = [texels[row % 3, k % 4, :3] * (1 - a) + texels[row % 3, (k + 1) % 4, :3] * a for row in (r, r + 1)]
+        return scene, rows[0] * (1 - b) + rows[1] * b
+
+    return make
+
+
+def test_only_constant_triangles_are_painted_and_cut_out_ones_are_gone():
+    texels = np.ones((1, 2, 4), np.float32)
+    texels[0, 0] = (0.5, 0.25, 0.125, 1.0)
+    texels[0, 1, 3] = 0.0
+    image = ImageTexture(read_only(texels), alpha_cutoff=0.5)
+    uv = [(0.1, 0.5)] * 3 + [(0.9, 0.5)] * 3 + [(0, 0), (1, 0), (0, 1)]
+    vertices = np.random.default_rng(1).uniform(-1, 1, (9, 3))
+    bare = mesh(vertices, [[0, 1, 2], [3, 4, 5], [6, 7, 8]], color=(1.0, 1.0, 0.5))
+    surface = dataclasses.replace(bare, uv=read_only(np.array(uv)), texture="t")
+    scene = Scene("s", FLAT, (surface,), {"t": image})
+    rest, painted = paint_constant(scene, linear=False).objects
+    assert rest.texture == "t"
+    np.testing.assert_array_equal(rest.vertices[rest.triangles[0]], surface.vertices[6:])
+    assert (painted.texture, painted.uv, painted.color) == (None, None, (0.5, 0.25, 0.0625))
+    np.testing.assert_array_equal(painted.vertices[painted.triangles[0]], surface.vertices[:3])
+    checker = dataclasses.replace(scene, textures={"t": Checker((2.0, 1.0))})
+    assert len(paint_constant(checker, linear=True).objects) == 3  # the rest, black, white
+    plain = dataclasses.replace(scene, objects=(mesh(surface.vertices, surface.triangles),))
+    assert paint_constant(plain, linear=False) is plain
+
+
+@pytest.mark.parametrize("wrong", [np.nan, np.inf, 1.5, -0.5])
+def test_a_picture_that_cannot_be_is_refused(monkeypatch, wrong):
+    whole = reference.PreparedReference._at_once
+    monkeypatch.setattr(
+        reference.PreparedReference, "_at_once",
+        lambda self, frame: dataclasses.replace(s := whole(self, frame), pixels=s.pixels + wrong),
+    )  # fmt: skip
+    with pytest.raises(UnsupportedScene, match="edge-fan: rounding errors make its picture impossible"):
+        render(load_scene("edge-fan"), "reference:", size=(4, 4))
