@@ -138,14 +138,14 @@ def _build() -> tuple[Parser, dict[str, Parser]]:
     _add_render(commands["render"])
     _add_run(commands["run"])
     report = commands["report"]
-    report.add_argument("run_dirs", nargs="+", type=Path, metavar="RUN_DIR")
-    report.add_argument("-o", "--output", type=Path, required=True, metavar="DIR", help="where the page goes")
+    report.add_argument("run_dirs", nargs="+", type=read_path, metavar="RUN_DIR")
+    report.add_argument("-o", "--output", type=read_path, required=True, metavar="DIR", help="where the page goes")
     _add_json(report)
     export = commands["export"]
-    export.add_argument("run_dir", type=Path, metavar="RUN_DIR")
+    export.add_argument("run_dir", type=read_path, metavar="RUN_DIR")
     export.add_argument("--format", default="json", metavar="FORMAT", help="json")
     export.add_argument("--json", dest="format", action="store_const", const="json", help="the same as --format json")
-    export.add_argument("-o", "--output", type=Path, metavar="FILE", help="default: standard output")
+    export.add_argument("-o", "--output", type=read_path, metavar="FILE", help="default: standard output")
     return parser, commands | _add_scenes(commands["scenes"])
 
 
@@ -156,7 +156,7 @@ def _add_json(parser: argparse.ArgumentParser) -> None:
 def _add_render(render: argparse.ArgumentParser) -> None:
     render.add_argument("scene", metavar="SCENE", help="a scene's name, as in propeller:blades=5, or a file")
     render.add_argument("technique", metavar="TECHNIQUE", help="a technique's name, or text as in raytrace:spp=4")
-    render.add_argument("-o", "--output", type=Path, required=True, metavar="OUT", help="a file, .exr or .png")
+    render.add_argument("-o", "--output", type=read_path, required=True, metavar="OUT", help="a file, .exr or .png")
     render.add_argument("--size", type=_read(read_size), default=(512, 512), metavar="WxH", help="default 512x512")
     render.add_argument("--frame", type=_read(whole(0)), default=0, metavar="N", help="frame number, default 0")
     render.add_argument("--seed", type=_read(whole(0)), default=0, metavar="N", help="default 0")
@@ -172,10 +172,10 @@ def _add_scenes(scenes: argparse.ArgumentParser) -> dict[str, Parser]:
     export, check, sheet = actions["export"], actions["check"], actions["sheet"]
     export.add_argument("scene", metavar="SCENE", help="a scene's name, as in propeller:blades=5, or a file")
     out = "a folder, or a path ending in .toml; images go beside the file (default: all to standard output)"
-    export.add_argument("-o", "--output", type=Path, metavar="DIR", help=out)
-    check.add_argument("files", nargs="+", type=Path, metavar="FILE", help="scene files, or models")
+    export.add_argument("-o", "--output", type=read_path, metavar="DIR", help=out)
+    check.add_argument("files", nargs="+", type=read_path, metavar="FILE", help="scene files, or models")
     sheet.add_argument("scene", nargs="*", metavar="SCENE", help="names or files; default: the whole catalog")
-    sheet.add_argument("-o", "--output", type=Path, required=True, metavar="DIR", help="where the pictures go")
+    sheet.add_argument("-o", "--output", type=read_path, required=True, metavar="DIR", help="where the pictures go")
     sheet.add_argument("--size", type=_read(read_size), default=(256, 256), metavar="WxH", help="default 256x256")
     sheet.add_argument("--frame", type=_read(whole(0)), default=0, metavar="N", help="frame number, default 0")
     for action in actions.values():
@@ -185,7 +185,7 @@ def _add_scenes(scenes: argparse.ArgumentParser) -> dict[str, Parser]:
 
 def _add_run(run: argparse.ArgumentParser) -> None:
     run.add_argument("suite", nargs="?", metavar="SUITE", help="a suite's name or file; without, give --scene")
-    run.add_argument("-o", "--output", type=Path, required=True, metavar="RUN_DIR", help="the run directory")
+    run.add_argument("-o", "--output", type=read_path, required=True, metavar="RUN_DIR", help="the run directory")
     run.add_argument("--scene", action="append", default=[], metavar="S", help="only this scene; repeatable")
     run.add_argument("--technique", action="append", default=[], metavar="T", help="only this technique; repeatable")
     run.add_argument("--size", type=_read(read_size), metavar="WxH", help="instead of the suite's")
@@ -224,6 +224,13 @@ def whole(low: int, high: int = MAX_WHOLE) -> Callable[[str], int]:
         return int(text)
 
     return read
+
+
+def read_path(text: str) -> Path:
+    """Return a path; a text without a character would be the current folder."""
+    if not text:
+        raise argparse.ArgumentTypeError("a path is needed")
+    return Path(text)
 
 
 def read_size(text: str) -> tuple[int, int]:

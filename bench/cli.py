@@ -265,7 +265,9 @@ def _scenes_check(options: argparse.Namespace) -> int:
     if not wrong and not unreadable:
         return OK
     found = ", ".join(f"{len(c.findings)} in {c.file}" for c in wrong)
-    return _complain("; ".join([*unreadable, *([f"problems: {found}"] if found else [])]), BAD_INPUT)
+    for text in [*unreadable, *([f"problems: {found}"] if found else [])]:
+        _complain(text, BAD_INPUT)
+    return BAD_INPUT
 
 
 def _scenes_sheet(options: argparse.Namespace) -> int:

@@ -5,13 +5,13 @@ leaves no torn picture behind. OpenImageIO does the encoding, and is imported on
 """
 
 import os
-import tempfile
+import secrets
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from aliasbench.scenes.errors import InputError, unknown_name
+from aliasbench.scenes.errors import InputError, reason_of, unknown_name
 from aliasbench.scenes.textures import linear_to_srgb
 
 EXTENSIONS = (".exr", ".png")
@@ -35,11 +35,19 @@ def check_output(path: Path) -> None:
             raise InputError(f"cannot write {str(path)!r}: no such folder {str(folder)!r}")
         if path.is_dir():
             raise InputError(f"cannot write {str(path)!r}: it is a folder")
-        handle, probe = tempfile.mkstemp(prefix=TEMPORARY_PREFIX, dir=folder)
+        make_temporary(folder).unlink()
     except OSError as error:
-        raise InputError(f"cannot write {str(path)!r}: {error.strerror or error}") from None
-    os.close(handle)
-    Path(probe).unlink()
+        raise InputError(f"cannot write {str(path)!r}: {reason_of(error)}") from None
+
+
+def make_temporary(folder: Path, suffix: str = "") -> Path:
+    """Return the path of a new, empty file in a folder, to be renamed when it is complete.
+
+    Who may read it is what the umask says, as of any file; those of `tempfile` are for their owner alone.
+    """
+    path = folder / f"{TEMPORARY_PREFIX}{secrets.token_hex(8)}{suffix}"
+    path.touch(exist_ok=False)
+    return path
 
 
 def check_folder_name(folder: Path) -> None:
@@ -70,19 +78,16 @@ def write_image(path: Path, pixels: NDArray[np.floating]) -> None:
     if pixels.ndim != 3 or pixels.shape[2] != 3:
         raise ValueError(f"pixels must be (h, w, 3), not {pixels.shape}")
     try:
-        handle, name = tempfile.mkstemp(prefix=TEMPORARY_PREFIX, suffix=path.suffix.lower(), dir=path.parent)
+        temporary = make_temporary(path.parent, path.suffix.lower())
     except OSError as error:
-        raise InputError(f"cannot write {str(path)!r}: {error.strerror or error}") from None
-    os.close(handle)
-    temporary = Path(name)
+        raise InputError(f"cannot write {str(path)!r}: {reason_of(error)}") from None
     try:
-        temporary.chmod(0o644)
         _encode(temporary, pixels)
         with temporary.open("rb") as written:
             os.fsync(written.fileno())
         temporary.replace(path)
     except OSError as error:
-        raise InputError(f"cannot write {str(path)!r}: {error.strerror or error}") from None
+        raise InputError(f"cannot write {str(path)!r}: {reason_of(error)}") from None
     finally:
         temporary.unlink(missing_ok=True)
 

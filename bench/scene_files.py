@@ -12,8 +12,8 @@ from aliasbench.bench.whole_files import make_folder, write_files
 from aliasbench.scenes.checking import Checked, check_scene_file
 from aliasbench.scenes.errors import InputError, UnsupportedScene
 from aliasbench.scenes.export import export_scene
-from aliasbench.scenes.files import load_scene
-from aliasbench.scenes.model import Animation, ImageTexture, Scene, Texture
+from aliasbench.scenes.files import NO_MEMORY, load_scene
+from aliasbench.scenes.model import TEXTURE_KINDS, Animation, ImageTexture, Scene, Texture
 from aliasbench.scenes.toml_text import safe_file_name
 
 PROBE_SIZE = (16, 16)  # pixels: enough to be told whether a scene can be drawn
@@ -44,7 +44,9 @@ def export_files(name: str, out: Path) -> list[Path]:
     folder, stem = (out.parent, out.stem) if out.suffix.lower() == ".toml" else (out, safe_file_name(scene.name))
     exported = export_scene(scene, beside=safe_file_name(stem))
     make_folder(folder)
-    return write_files(folder, {f"{stem}.toml": exported.text.encode("utf-8"), **exported.images})
+    # The scene file last: what it names is there before it is.
+    *images, written = write_files(folder, {**exported.images, f"{stem}.toml": exported.text.encode("utf-8")})
+    return [written, *images]
 
 
 def supported_by(scene: Scene) -> dict[str, str | None]:
@@ -58,6 +60,8 @@ def supported_by(scene: Scene) -> dict[str, str | None]:
                 found[renderer] = None
         except (UnsupportedScene, InputError) as error:
             found[renderer] = str(error)
+        except MemoryError:
+            found[renderer] = NO_MEMORY
     return found
 
 
@@ -122,7 +126,7 @@ def checked_lines(checked: Checked) -> list[str]:
     moving = summary.animation
     kinds = Counter(summary.textures.values())
     parts = [
-        f"{_counted(summary.objects, 'object')} of {_counted(summary.triangles, 'triangle')}",
+        _counted_objects(summary),
         ", ".join(f"{count} {kind}" for kind, count in kinds.items()) or "no texture",
         *([_counted(summary.lights, "light")] if summary.lights else []),
         "still" if summary.still else f"{_counted(moving.frames, 'frame')} at {moving.fps:g} fps",
@@ -134,12 +138,19 @@ def checked_lines(checked: Checked) -> list[str]:
     return lines + [f"    not by {name}: {why}" for name, why in summary.renderers.items() if why is not None]
 
 
+def _counted_objects(summary: Summary) -> str:
+    if not summary.objects:
+        return "no objects"
+    return f"{_counted(summary.objects, 'object')} of {_counted(summary.triangles, 'triangle')}"
+
+
 def _counted(count: int, what: str) -> str:
     return f"{count} {what}{'s' if count != 1 else ''}"
 
 
 def _kind_of(texture: Texture) -> str:
+    kind = TEXTURE_KINDS[type(texture)]
     if isinstance(texture, ImageTexture):
         height, width = texture.texels.shape[:2]
-        return f"image {width} x {height}{' with cut-outs' if texture.alpha_cutoff is not None else ''}"
-    return {"Checker": "checker", "Grating": "grating", "ZonePlate": "zone plate"}[type(texture).__name__]
+        return f"{kind} {width} x {height}{' with cut-outs' if texture.alpha_cutoff is not None else ''}"
+    return kind.replace("_", " ")

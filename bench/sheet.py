@@ -22,7 +22,7 @@ from aliasbench.scenes.catalog import SCENES
 from aliasbench.scenes.errors import InputError, UnsupportedScene
 from aliasbench.scenes.model import Scene
 from aliasbench.scenes.textures import linear_to_srgb
-from aliasbench.scenes.toml_text import safe_file_name
+from aliasbench.scenes.toml_text import free_file_name, safe_file_name
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -123,7 +123,7 @@ def make_sheet(
             raise InputError(f"size {size[0]}x{size[1]}: {name} must be from {LEAST_SIDE} to {MOST_SIDE} on a sheet")
     scenes = [load_scene(name) for name in names or SCENES]
     make_folder(out)
-    taken: set[str] = {"overview.png"}
+    taken = ["overview.png"]
     rows = []
     for number, scene in enumerate(scenes):
         panels = []
@@ -132,7 +132,8 @@ def make_sheet(
             on_step(f"[{step}/{len(scenes) * len(COLUMNS)}] {scene.name} by {technique}")
             panels.append(_draw(scene, technique, title, size, frame))
         film = _draw_film(scene, size, frame) if scene.facts.rotors else ()
-        rows.append(Row(scene.name, _summary(scene), _free_name(scene.name, taken), panels, film))
+        taken.append(free_file_name(safe_file_name(scene.name), ".png", taken))
+        rows.append(Row(scene.name, _summary(scene), taken[-1], panels, film))
     contents = {row.image: _png(_paste_rows([row], size, columns=1)) for row in rows}
     width = 2 * MARGIN + _row_width(size)
     contents["overview.png"] = _png(_paste_rows(rows, size, columns=max(1, OVERVIEW_WIDTH // width)))
@@ -173,15 +174,6 @@ def _bytes(pixels: NDArray[np.floating]) -> Pixels:
 def _summary(scene: Scene) -> str:
     entry = SCENES.get(scene.name.partition(":")[0])
     return entry.summary if entry is not None else ""
-
-
-def _free_name(scene: str, taken: set[str]) -> str:
-    stem = safe_file_name(scene)
-    name, number = f"{stem}.png", 2
-    while name.lower() in taken:
-        name, number = f"{stem}-{number}.png", number + 1
-    taken.add(name.lower())
-    return name
 
 
 def _row_width(size: tuple[int, int]) -> int:

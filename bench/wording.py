@@ -6,13 +6,10 @@ digits. What is stored and exported stays as it was given; only what people read
 
 import re
 
+from aliasbench.scenes.errors import printable as printable
+
 SHOWN = 60  # characters of a value in a message
 LONGEST_WORD = 200  # long paths stay whole, endless values do not
-
-
-def printable(text: str) -> str:
-    """Return a text with everything that does not print (escapes, line breaks, bytes of no encoding) written out."""
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
 
 
 def shortened(text: str, limit: int = SHOWN) -> str:

@@ -26,6 +26,8 @@ LEAST_SHARE = 1e-3
 MOST_ROWS = 32  # of one rate that are measured: without noise a band's are all the same
 DITHERS: tuple[Dither, ...] = ("none", "triangular")
 STEP = 1.0 / 255.0  # of 8 bits; a wave of less is no wave
+_TORN = 1e-3  # pixels between a row's middle and a border, below which the row belongs to neither side
+_FLAT = ("unlit", "diffuse")  # materials of one radiance in all directions where there are no lights
 _CLOSE = 1e-9  # of depths: as near as this, the later surface wins
 
 
@@ -37,7 +39,7 @@ def original_rows(
     Parameters
     ----------
     scene : Scene
-        Unlit, seen through a pinhole or orthographically.
+        Unlit, or diffuse without lights, which is the same; seen through a pinhole or orthographically.
     size : (width, height)
         Of the picture, pixels.
     rows : sequence of int
@@ -50,14 +52,14 @@ def original_rows(
     Raises
     ------
     UnsupportedScene
-        If the scene has lights, materials that are not unlit, or a lens.
+        If the scene has lights, glossy or other materials that mirror or refract, or a lens.
     InputError
         If the picture has no such row.
     """
     for row in rows:
         if not 0 <= row < size[1]:
             raise InputError(f"row = {row}: must be a row of the picture, 0 to {size[1] - 1}")
-    if scene.lights or scene.camera.lens_radius or any(s.material.kind != "unlit" for s in scene.objects):
+    if scene.lights or scene.camera.lens_radius or any(s.material.kind not in _FLAT for s in scene.objects):
         raise UnsupportedScene("the signal along a row is known of unlit scenes without lights and lens only")
     view = view_at(scene.camera, scene.animation, frame, 0.0, size)
     x = np.asarray(x_px, dtype=np.float64)
@@ -162,12 +164,14 @@ class Band:
 def grating_bands(scene: Scene, size: tuple[int, int]) -> tuple[Band, ...]:
     """Return the bands of a picture that show gratings along x, from the top; none where the picture moves.
 
-    Only of orthographic scenes made of upright rectangles, of which the later ones hide the earlier.
+    Only of orthographic scenes made of upright rectangles, of which the later ones hide the earlier. Rows whose middle
+    is on a border are in no band: which of the two a renderer shows there is anyone's guess.
     """
     view = view_at(scene.camera, scene.animation, 0, 0.0, size)
     if view.perspective or not scene.is_static:
         return ()
     shown = [-1] * size[1]
+    torn: set[int] = set()
     waves: dict[int, tuple[Grating, float]] = {}
     for number, surface in enumerate(scene.objects):
         outline = view.project(surface.vertices)[:, :2]
@@ -176,6 +180,7 @@ def grating_bands(scene: Scene, size: tuple[int, int]) -> tuple[Band, ...]:
             continue
         for row in range(max(int(np.ceil(top - 0.5)), 0), min(int(np.ceil(bottom - 0.5)), size[1])):
             shown[row] = number
+        torn.update(round(y - 0.5) for y in (top, bottom) if abs(y - 0.5 - round(y - 0.5)) < _TORN)
         grating = None if surface.texture is None else scene.textures[surface.texture]
         if isinstance(grating, Grating) and surface.uv is not None:
             at, uv = (a[surface.triangles[0]] for a in (outline, surface.uv))
@@ -184,7 +189,7 @@ def grating_bands(scene: Scene, size: tuple[int, int]) -> tuple[Band, ...]:
             across, down = (float(grating.cycles * change) for change in per_px)
             if abs(down) <= 1e-9 * abs(across):
                 waves[number] = (grating, abs(across))
-    rows = {number: tuple(row for row, other in enumerate(shown) if other == number) for number in waves}
+    rows = {n: tuple(row for row, other in enumerate(shown) if other == n and row not in torn) for n in waves}
     return tuple(Band(rows[number], *waves[number]) for number in sorted(waves, key=lambda n: rows[n]) if rows[number])
 
 

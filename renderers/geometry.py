@@ -15,11 +15,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from aliasbench.scenes.errors import UnsupportedScene
 from aliasbench.scenes.model import FloatArray, Motion, Scene, Surface
 
 # Relative step between layers: some 60 ulp of float32, well over the rounding of a ray-plane hit (a few ulp) and far
 # below anything a scene means by two different planes.
 LAYER_STEP = 2.0**-18
+MOST_LAYERS = 4096  # together 1.6 % of the distance; beyond, more and more would be brought before what is nearer
+_AT_ONCE = 64  # outlines that are cut with another at a time
 _PLANE_TOLERANCE = 1e-7  # two planes closer than this (relative to the scene) are one
 
 
@@ -90,6 +93,11 @@ def coplanar_layers(scene: Scene) -> NDArray[np.int32]:
 
     Objects that move alike are compared as they lie (sharing only an edge is no overlap); objects that move differently
     but stay in one plane may overlap at some time, so the later one is always put above. Meshes have layer 0.
+
+    Raises
+    ------
+    UnsupportedScene
+        If more than `MOST_LAYERS` lie on top of each other.
     """
     layers = np.zeros(len(scene.objects), np.int32)
     planes: dict[tuple[int, ...], list[int]] = {}
@@ -108,15 +116,21 @@ def coplanar_layers(scene: Scene) -> NDArray[np.int32]:
 def _stack(surfaces: list[Surface]) -> NDArray[np.int32]:
     """Return the layers of surfaces that lie in one plane."""
     motions = {m: k for k, m in enumerate(dict.fromkeys(_effective(s.motion) for s in surfaces))}
-    kind = np.array([motions[_effective(s.motion)] for s in surfaces])
-    below: list[list[int]] = [[] for _ in surfaces]
-    for i, j in _overlapping_pairs(surfaces, kind):
-        below[max(i, j)].append(min(i, j))
+    outlines = _Outlines(surfaces, [motions[_effective(s.motion)] for s in surfaces])
+    highest = np.full(len(motions), -1)  # layer so far, by motion
+    top = np.full(len(outlines.kinds), -1)  # the same by outline
     layers = np.zeros(len(surfaces), np.int32)
-    for i in range(1, len(surfaces)):
-        others = layers[:i][kind[:i] != kind[i]]
-        highest = max((layers[j] for j in below[i]), default=-1)
-        layers[i] = max(highest, others.max(initial=-1)) + 1
+    for i, outline in enumerate(outlines.of_surface):
+        kind = outlines.kinds[outline]
+        others = max(highest[:kind].max(initial=-1), highest[kind + 1 :].max(initial=-1))
+        layer = int(max(others, outlines.highest_below(outline, top))) + 1
+        if layer > MOST_LAYERS:
+            raise UnsupportedScene(
+                f"more than {MOST_LAYERS} objects on top of each other in one plane; move them apart, each a little "
+                "nearer than the one before"
+            )
+        layers[i] = top[outline] = layer
+        highest[kind] = max(highest[kind], layer)
     return layers
 
 
@@ -124,21 +138,51 @@ def _effective(motion: Motion) -> Motion:
     return Motion() if motion.is_static else motion
 
 
-def _overlapping_pairs(surfaces: list[Surface], kind: NDArray[np.int64]) -> list[tuple[int, int]]:
-    """Return the pairs of coplanar surfaces of one motion whose insides meet."""
-    import shapely
+class _Outlines:
+    """The outlines of coplanar surfaces, each once however many surfaces have it, and which of them overlap.
 
-    normal, _ = _plane_of(surfaces[0])
-    axis = int(np.argmax(np.abs(normal)))
-    keep = [k for k in range(3) if k != axis]
-    shapes = np.array([shapely.Polygon(s.vertices[:, keep]) for s in surfaces])
-    first, second = shapely.STRtree(shapes).query(shapes, predicate="intersects")
-    chosen = (first < second) & (kind[first] == kind[second])
-    first, second = first[chosen], second[chosen]
-    area = shapely.area(shapes)
-    shared = shapely.area(shapely.intersection(shapes[first], shapes[second]))
-    inside = shared > 1e-12 * np.minimum(area[first], area[second])
-    return list(zip(first[inside].tolist(), second[inside].tolist(), strict=True))
+    Parameters
+    ----------
+    surfaces : list of Surface
+    kinds : list of int
+        Which motion each has; only outlines of one motion are compared.
+    """
+
+    def __init__(self, surfaces: list[Surface], kinds: list[int]) -> None:
+        import shapely
+
+        normal, _ = _plane_of(surfaces[0])
+        keep = [k for k in range(3) if k != int(np.argmax(np.abs(normal)))]
+        found: dict[tuple[int, bytes], int] = {}
+        first: list[int] = []
+        self.of_surface: list[int] = []
+        for k, (surface, kind) in enumerate(zip(surfaces, kinds, strict=True)):
+            number = found.setdefault((kind, surface.vertices.tobytes()), len(found))
+            if number == len(first):
+                first.append(k)
+            self.of_surface.append(number)
+        self.kinds = np.array([kinds[k] for k in first])
+        self._shapes = np.array([shapely.Polygon(surfaces[k].vertices[:, keep]) for k in first])
+        self._areas = shapely.area(self._shapes)
+        self._tree = shapely.STRtree(self._shapes)
+
+    def highest_below(self, outline: int, top: NDArray[np.int64]) -> int:
+        """Return the highest of the layers `top` (-1 where there is none yet) of all outlines that one overlaps."""
+        import shapely
+
+        shape, area = self._shapes[outline], self._areas[outline]
+        highest = int(top[outline]) if area > 0.0 else -1
+        near = self._tree.query(shape)
+        near = near[(top[near] > highest) & (self.kinds[near] == self.kinds[outline]) & (near != outline)]
+        near = near[np.argsort(-top[near], kind="stable")]
+        # From the highest down, so that a few are looked at where many lie on top of each other.
+        for start in range(0, len(near), _AT_ONCE):
+            part = near[start : start + _AT_ONCE]
+            shared = shapely.area(shapely.intersection(shape, self._shapes[part]))
+            inside = shared > 1e-12 * np.minimum(area, self._areas[part])
+            if inside.any():
+                return int(top[part[int(np.argmax(inside))]])
+        return highest
 
 
 def _scene_extent(scene: Scene) -> float:

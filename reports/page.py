@@ -4,9 +4,7 @@ Everything is inside the one file (pictures, the chart library, style and script
 as a build artifact and opened from a disk. This module gathers; figures, charts and tables decide; the template draws.
 """
 
-import os
 import re
-import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -18,13 +16,13 @@ import jinja2
 from markupsafe import Markup, escape
 from plotly.offline import get_plotlyjs
 
+from aliasbench.bench.whole_files import make_folder, write_files
 from aliasbench.bench.wording import certainty
 from aliasbench.reports import charts, tables
 from aliasbench.reports.figures import HEAT_HIGH, HEAT_LOW, heat_palette
 from aliasbench.reports.gallery import Gallery, make_galleries
 from aliasbench.reports.records import Record, Run, load_runs
 from aliasbench.reports.signal_figures import SignalFigure, draw_records
-from aliasbench.scenes.errors import InputError
 
 MAIN_FACTS = ("cpu", "cores", "memory", "os", "python", "aliasbench", "opengl", "embree")
 
@@ -78,16 +76,8 @@ def write_report(run_dirs: Sequence[Path], out: Path) -> Path:
         If a directory holds no run or the page cannot be written.
     """
     text = render_page(load_runs(run_dirs))
-    page = Path(out) / "index.html"
-    try:
-        page.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(prefix=".writing-", suffix=".html", dir=page.parent)
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            file.write(text)
-        Path(name).chmod(0o644)
-        Path(name).replace(page)
-    except OSError as error:
-        raise InputError(f"cannot write the report to {str(out)!r}: {error.strerror or error}") from None
+    make_folder(Path(out))
+    (page,) = write_files(Path(out), {"index.html": text.encode("utf-8")})
     return page
 
 

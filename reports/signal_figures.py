@@ -7,6 +7,7 @@ of the page's style sheet: lines and dots of a lecture's figure, which are looke
 import html
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import takewhile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -219,10 +220,12 @@ def draw_rates(points: Sequence[RatePoint]) -> SignalFigure:
 
 def _rates_in_words(points: Sequence[RatePoint]) -> str:
     """Return from which rate on the frequency is right, what 2 and 4 samples per cycle show, and what 8 bits change."""
-    right = [p for p in points if abs(p.recovered - p.cycles_per_px) < 1e-3]
+    downwards = sorted(points, key=lambda p: p.rate, reverse=True)
+    # up to the first that is wrong: below it one may be right by chance
+    right = list(takewhile(lambda p: abs(p.recovered - p.cycles_per_px) < 1e-3, downwards))
     lines = []
     if right and len(right) < len(points):
-        lines.append(f"The frequency comes back from {number(min(p.rate for p in right))} samples per cycle on.")
+        lines.append(f"The frequency comes back from {number(right[-1].rate)} samples per cycle on.")
     for p in (p for wanted in (2.0, 4.0) for p in points if abs(p.rate - wanted) < 1e-6 * wanted):
         lines.append(
             f"At {number(p.rate)} the amplitude is {p.amplitude_low:.2f} to {p.amplitude_high:.2f} of the original's, "

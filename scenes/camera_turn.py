@@ -9,21 +9,29 @@ more than their width from frame to frame, and with the shutter open for the str
 The rows stand above one another and hide nothing, so that each shows its own motion; `kind=bricks` hangs a photograph
 of bricks in their place. The camera looks straight ahead in the middle of the animation. A target that moves in a
 straight line never comes back, so the sequence is short and does not loop, and no fact is declared.
+
+The rows reach across a picture four times as wide as high. Where a fast turn and a fast travel against it swing the
+view so far that such a picture would look back along a row, they end 85 degrees from straight ahead, which is enough
+for a picture twice as wide as high.
 """
 
 import math
+from dataclasses import replace
 from typing import NamedTuple
 
+import numpy as np
+
 from aliasbench.scenes.entries import Choice, Parameter, SceneEntry
-from aliasbench.scenes.model import Animation, Camera, Scene, Surface, Vec3
+from aliasbench.scenes.model import Animation, Camera, Scene, Surface, Vec3, read_only
 from aliasbench.scenes.photographs import load_photograph
 from aliasbench.scenes.shapes import quad
 from aliasbench.scenes.staging import FPS
 
 FOV_Y_DEG = 50.0
 TARGET_DEPTH = 5.0
-FRAMES = 12  # the fastest turn takes the axis 16 degrees to either side
-REACH = 1.7  # half a row's length over its depth: what a picture twice as wide as high sees at the fastest turn
+FRAMES = 12  # the fastest turn takes the axis 17 degrees to either side
+WIDEST = 4.25  # width over height of what the rows fill: pictures, and what filters see beside them
+STEEPEST = math.radians(85.0)  # from straight ahead to a row's end
 PHOTO_SHARE = 0.3  # of a row's depth: width of a photograph
 
 
@@ -62,34 +70,39 @@ def build_camera_turn(*, name: str, kind: str, turn: float, travel: float, shutt
         velocity=(travel, 0.0, 0.0),
         target_velocity=(drift, 0.0, 0.0),
     )
+    swing = math.atan(abs(drift - travel) * middle / TARGET_DEPTH)
+    steepest = min(swing + math.atan(WIDEST * math.tan(math.radians(FOV_Y_DEG / 2))), STEEPEST)
+    reaches = [math.tan(steepest) + abs(travel) * middle / row.depth for row in ROWS]
     photographed = kind == "bricks"
+    parts = [_panel(row, r) if photographed else _posts(row, r) for row, r in zip(ROWS, reaches, strict=True)]
     return Scene(
         name=name,
         camera=camera,
-        objects=tuple(_panel(row) for row in ROWS) if photographed else tuple(p for row in ROWS for p in _posts(row)),
+        objects=tuple(surface for part in parts for surface in part),
         textures={"brick": load_photograph("brick")} if photographed else {},
         animation=Animation(fps=float(FPS), frames=frames, shutter=shutter),
     )
 
 
-def _posts(row: Row) -> list[Surface]:
-    count = math.floor(REACH / row.pitch)
+def _posts(row: Row, reach: float) -> list[Surface]:
+    """Return a row's posts, up to `reach` times the depth to either side."""
+    count = math.ceil(reach / row.pitch)
     half = row.pitch * WIDTH_SHARE / 2
+    middle = quad(_corners(row, -half, half), color=row.color)
+    places = np.arange(-count, count + 1) * row.pitch * row.depth
+    vertices = read_only(middle.vertices + places[:, None, None] * (1.0, 0.0, 0.0))
     return [
-        quad(
-            _corners(row, k * row.pitch - half, k * row.pitch + half),
-            color=row.color,
-            name=f"post {k} of {row.depth:g}",
-        )
-        for k in range(-count, count + 1)
+        # A post to the side needs no new check, and checking hundreds of them takes longer than all else.
+        replace(middle, vertices=own, name=f"post {k} of {row.depth:g}")
+        for k, own in enumerate(vertices, start=-count)
     ]
 
 
-def _panel(row: Row) -> Surface:
-    corners = _corners(row, -REACH, REACH)
+def _panel(row: Row, reach: float) -> list[Surface]:
+    corners = _corners(row, -reach, reach)
     unit = row.depth * PHOTO_SHARE
     uv = [(x / unit, y / unit) for x, y, _ in corners]
-    return quad(corners, color=row.color, uv=uv, texture="brick", name=f"bricks of {row.depth:g}")
+    return [quad(corners, color=row.color, uv=uv, texture="brick", name=f"bricks of {row.depth:g}")]
 
 
 def _corners(row: Row, left: float, right: float) -> list[Vec3]:

@@ -9,11 +9,9 @@ The pan goes along the rows of squares; after two squares the picture is the sam
 pan and no grating are declared: under perspective the picture has no one velocity, and no one frequency.
 """
 
-import math
-
 from aliasbench.scenes.entries import Parameter, SceneEntry
-from aliasbench.scenes.floors import EYE_HEIGHT, FOV_Y_DEG, NEAR_Z, PITCH_DEG, SKY
-from aliasbench.scenes.model import Animation, Camera, Checker, Scene
+from aliasbench.scenes.floors import NEAR_Z, SKY, floor_camera
+from aliasbench.scenes.model import Animation, Checker, Scene
 from aliasbench.scenes.shapes import quad
 from aliasbench.scenes.staging import FPS, loop_frames
 
@@ -23,20 +21,12 @@ RESERVE_S = 20.0  # seconds of motion for which the floor goes on
 
 def build_checker_floor(*, name: str, squares: float, far: float, speed: float, shutter: float) -> Scene:
     """Return the floor seen by a camera that moves sideways with `speed` (world units per second); see the catalog."""
-    pitch = math.radians(PITCH_DEG)
     half = WIDTH_SHARE * far + RESERVE_S * abs(speed)
     corners = [(-half, 0.0, NEAR_Z), (half, 0.0, NEAR_Z), (half, 0.0, -far), (-half, 0.0, -far)]
     floor = quad(corners, uv=[(x, -z) for x, _, z in corners], texture="checker", name="floor")
-    camera = Camera(
-        projection="perspective",
-        position=(0.0, EYE_HEIGHT, 0.0),
-        target=(0.0, EYE_HEIGHT - math.sin(pitch), -math.cos(pitch)),
-        fov_y_deg=FOV_Y_DEG,
-        velocity=(speed, 0.0, 0.0),
-    )
     return Scene(
         name=name,
-        camera=camera,
+        camera=floor_camera(speed),
         objects=(floor,),
         textures={"checker": Checker((squares, squares))},
         background=SKY,

@@ -8,9 +8,10 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-from aliasbench.scenes.errors import InputError
-from aliasbench.scenes.files import load_scene, parse_toml, read_root, read_text
+from aliasbench.scenes.errors import InputError, one_line, reason_of
+from aliasbench.scenes.files import NO_MEMORY, load_scene, parse_toml, read_root, read_text
 from aliasbench.scenes.lines import key_lines, line_of
+from aliasbench.scenes.local_files import open_input
 from aliasbench.scenes.meshes import MODEL_SUFFIXES
 from aliasbench.scenes.model import Scene
 from aliasbench.scenes.problems import Place, Problem, Problems
@@ -50,9 +51,16 @@ def check_scene_file(path: Path) -> Checked:
     InputError
         If there is no such file, or it cannot be read.
     """
+    try:
+        return _check_model(path) if path.suffix.lower() in MODEL_SUFFIXES else _check_scene(path)
+    except MemoryError:
+        return Checked(str(path), None, (Finding(None, "", NO_MEMORY),))
+    except OSError as error:
+        return Checked(str(path), None, (Finding(None, "", f"cannot be read: {reason_of(error)}"),))
+
+
+def _check_scene(path: Path) -> Checked:
     file = str(path)
-    if path.suffix.lower() in MODEL_SUFFIXES:
-        return _check_model(path)
     text = read_text(path)
     try:
         values = parse_toml(text, file)
@@ -74,11 +82,12 @@ def check_scene_file(path: Path) -> Checked:
 def _check_model(path: Path) -> Checked:
     file = str(path)
     try:
-        with path.open("rb"):
+        with open_input(path):
             pass
     except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        raise InputError(f"{file}: cannot be read ({reason}); the path of a scene or model file is needed") from error
+        raise InputError(
+            f"{file}: cannot be read ({reason_of(error)}); the path of a scene or model file is needed"
+        ) from error
     try:
         return Checked(file, load_scene(file), ())
     except InputError as error:
@@ -86,7 +95,7 @@ def _check_model(path: Path) -> Checked:
 
 
 def _of_error(file: str, error: InputError) -> Finding:
-    text = str(error).removeprefix(f"{file}: ")
+    text = str(error).removeprefix(one_line(f"{file}: "))
     line = _LINE.match(text)
     if line is not None:
         text = re.sub(r"^line \d+(, (?P<column>column \d+))?: ", lambda m: f"{m['column']}: " if m[1] else "", text)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aliasbench.scenes.entries import Parameter, SceneEntry
-from aliasbench.scenes.model import Animation, Facts, FloatArray, Motion, PanFact, Scene, Surface, Vec3
+from aliasbench.scenes.model import Animation, Facts, FloatArray, Motion, PanFact, Scene, Surface, Vec3, as_vec3
 from aliasbench.scenes.shapes import mesh
 from aliasbench.scenes.staging import FPS, flat_camera, loop_frames
 
@@ -50,13 +50,15 @@ def build_confetti(*, name: str, count: int, size_px: float, seed: int, speed: f
         low -= RESERVE
     else:
         high += RESERVE
-    copies = _shifts(low, high)[:, None, None, :] + cell
-    middles = copies[..., :2].mean(axis=2)
-    covered = ((middles > low) & (middles < high)).all(axis=-1)
-    velocity = _vec3(speed * DRIFT)
+    shifts = _shifts(low, high)
+    # of triangles' middles, before any corner is put in its place: most of the copies are outside
+    x, y = (shifts[:, None, k] + cell[..., k].mean(axis=1) for k in (0, 1))
+    covered = (x > low[0]) & (x < high[0]) & (y > low[1]) & (y < high[1])
+    velocity = as_vec3(speed * DRIFT)
     objects: list[Surface] = []
     for k, rgb in enumerate(COLORS):
-        corners = copies[covered & (color == k)].reshape(-1, 3)
+        copy, triangle = np.nonzero(covered & (color == k))
+        corners = (shifts[copy, None, :] + cell[triangle]).reshape(-1, 3)
         if len(corners):
             triangles = np.arange(len(corners)).reshape(-1, 3)
             motion = Motion(velocity=velocity)
@@ -96,11 +98,6 @@ def _cell(count: int, largest: float, seed: int) -> tuple[FloatArray, NDArray[np
     angle = 2 * math.pi * rng.random((count, 1)) + np.cumsum(gaps, axis=1)
     around = np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], axis=-1)
     return middle[:, None, :] + radius[..., None] * around, rng.integers(len(COLORS), size=count)
-
-
-def _vec3(vector: FloatArray) -> Vec3:
-    x, y, z = vector.tolist()
-    return (x, y, z)
 
 
 ENTRIES = (

@@ -15,7 +15,7 @@ import numpy as np
 
 from aliasbench.scenes.entries import Parameter, SceneEntry
 from aliasbench.scenes.errors import InputError
-from aliasbench.scenes.model import Animation, EdgeFact, Facts, Motion, Scene, Spin, Surface, Vec3
+from aliasbench.scenes.model import Animation, EdgeFact, Facts, Motion, Scene, Spin, Surface, Vec3, as_vec3
 from aliasbench.scenes.shapes import polygon, quad
 from aliasbench.scenes.staging import FPS, LEAST_FRAMES, flat_camera, loop_frames, polar
 
@@ -44,7 +44,7 @@ def build_near_horizontal_edge(*, name: str, slope: float, offset: float, speed:
         camera=flat_camera(),
         objects=(plane,),
         animation=Animation(fps=float(FPS), frames=LEAST_FRAMES if speed else 1, shutter=shutter),
-        facts=Facts(edges=(EdgeFact(_vec3(start), _vec3(end)),)),
+        facts=Facts(edges=(EdgeFact(as_vec3(start), as_vec3(end)),)),
     )
 
 
@@ -81,11 +81,6 @@ def build_edge_fan(*, name: str, wedges: int, rev_per_s: float, shutter: float) 
         animation=Animation(fps=float(FPS), frames=loop_frames(rev_per_s) if rev_per_s else 1, shutter=shutter),
         facts=Facts(edges=tuple(edges)),
     )
-
-
-def _vec3(point: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> Vec3:
-    x, y, z = point.tolist()
-    return (x, y, z)
 
 
 ENTRIES = (

@@ -12,7 +12,7 @@ The text is read back before it is handed out, so that what cannot be written is
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -22,10 +22,20 @@ from aliasbench.scenes.errors import InputError, shortened
 from aliasbench.scenes.files import SCHEMA, read_scene_text
 from aliasbench.scenes.image_data import exr_bytes
 from aliasbench.scenes.inline_data import DATA_PREFIX, MAX_IMAGE_BYTES, encode_array, encode_data
-from aliasbench.scenes.model import Camera, Facts, ImageTexture, Material, Motion, Scene, Surface, Texture
+from aliasbench.scenes.model import (
+    TEXTURE_KINDS,
+    Camera,
+    Facts,
+    ImageTexture,
+    Material,
+    Motion,
+    Scene,
+    Surface,
+    Texture,
+)
 from aliasbench.scenes.photographs import PHOTOGRAPHS, SOURCE_PREFIX, load_photograph
 from aliasbench.scenes.shapes import QUAD_UV
-from aliasbench.scenes.toml_text import assignment, header, inline_table, safe_file_name, written
+from aliasbench.scenes.toml_text import assignment, free_file_name, header, inline_table, safe_file_name, written
 
 LONGEST_LIST = 256  # rows of an array written as numbers; longer ones are base64
 
@@ -184,19 +194,16 @@ def _texture(name: str, texture: Texture, beside: str | None, images: dict[str, 
     lines = [header("texture", name)]
     if isinstance(texture, ImageTexture):
         return lines + _image(name, texture, beside, images)
-    kinds = {"Checker": "checker", "Grating": "grating", "ZonePlate": "zone_plate"}
-    kind = type(texture).__name__
-    keys = {
-        "Checker": ("squares", "black", "white"),
-        "Grating": ("cycles", "angle_deg", "phase", "profile", "low", "high"),
-        "ZonePlate": ("center", "k", "phase"),
-    }[kind]
-    note = {
-        "Checker": "# squares to a unit of u and of v",
-        "Grating": "# low + (high - low) (1 + cos(2 pi (cycles s + phase))) / 2, s = u cos(angle) + v sin(angle)",
-        "ZonePlate": "# (1 + cos(k r^2 + phase)) / 2, r from the center in uv",
-    }[kind]
-    return [*lines, note, f"{kinds[kind]} = {inline_table({key: getattr(texture, key) for key in keys})}"]
+    kind = TEXTURE_KINDS[type(texture)]
+    values = {f.name: getattr(texture, f.name) for f in fields(texture)}
+    return [*lines, f"# {_TEXTURE_NOTES[kind]}", f"{kind} = {inline_table(values)}"]
+
+
+_TEXTURE_NOTES = {
+    "checker": "squares to a unit of u and of v",
+    "grating": "low + (high - low) (1 + cos(2 pi (cycles s + phase))) / 2, s = u cos(angle) + v sin(angle)",
+    "zone_plate": "(1 + cos(k r^2 + phase)) / 2, r from the center in uv",
+}
 
 
 def _image(name: str, texture: ImageTexture, beside: str | None, images: dict[str, bytes]) -> list[str]:
@@ -206,7 +213,7 @@ def _image(name: str, texture: ImageTexture, beside: str | None, images: dict[st
     if _is_photograph(texture):
         lines, image, source = ["# a photograph that scikit-image ships"], texture.source, None
     elif beside is not None:
-        image = _free_name(f"{beside}-{safe_file_name(name)}", images)
+        image = free_file_name(f"{beside}-{safe_file_name(name)}", ".exr", images)
         images[image] = exr_bytes(texture.texels)
         source = None if source == image else source
     else:
@@ -232,13 +239,6 @@ def _is_photograph(texture: ImageTexture) -> bool:
     if word == texture.source or word not in PHOTOGRAPHS.values():
         return False
     return load_photograph(word, texture.alpha_cutoff) == texture
-
-
-def _free_name(stem: str, taken: Mapping[str, bytes]) -> str:
-    name, number = f"{stem}.exr", 2
-    while name.lower() in {other.lower() for other in taken}:
-        name, number = f"{stem}-{number}.exr", number + 1
-    return name
 
 
 def _facts(facts: Facts) -> Iterator[list[str]]:

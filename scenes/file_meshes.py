@@ -1,7 +1,8 @@
 """The object of a scene file that is a model file: its surfaces, with what the object says of all of them.
 
-A colour multiplies every surface's own; a texture of the scene file replaces theirs, in the model's own coordinates;
-a motion replaces the model's animation, which goes on by the scene file's clock otherwise.
+A colour multiplies every surface's own; a texture of the scene file replaces theirs, in the model's own coordinates,
+and is multiplied by the mean of vertex colours as a texture of the model's own is; a motion replaces the model's
+animation, which goes on by the scene file's clock otherwise.
 """
 
 from collections.abc import Mapping
@@ -40,10 +41,10 @@ def read_mesh_object(table: Table, textures: Mapping[str, Texture], folder: Path
     if not given:
         table.problems.give_up()
     try:
-        model = load_mesh(folder / given, label=given)
+        model = load_mesh(folder / given, label=given, retextured=texture is not None)
     except InputError as error:
         table.problems.refuse(place, f"{table.where('mesh')}: {error}")
-    if texture is None and (taken := sorted(set(model.textures) & set(textures))):
+    if taken := sorted(set(model.textures) & set(textures)):
         table.problems.refuse(
             place, f"{table.where('mesh')}: its texture {taken[0]!r} has the name of the scene file's"
         )
@@ -63,4 +64,4 @@ def read_mesh_object(table: Table, textures: Mapping[str, Texture], folder: Path
         )
         for k, surface in enumerate(model.surfaces)
     )
-    return Pieces(surfaces, model.textures if texture is None else {})
+    return Pieces(surfaces, model.textures)

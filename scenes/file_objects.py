@@ -135,7 +135,10 @@ def read_name(table: Table, default: str, most: int = MAX_NAME) -> str:
 
 def read_material(table: Table) -> Material:
     """Return the material of an object."""
+    mark = table.problems.mark()
     kind = table.choice("material", tuple(_MATERIALS), "unlit")
+    if not table.problems.sound_since(mark):
+        return Material("unlit")
     for owner, keys in _MATERIALS.items():
         for key in keys:
             if table.has(key) and owner != kind:

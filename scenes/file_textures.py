@@ -10,37 +10,40 @@ from dataclasses import replace
 from pathlib import Path
 
 from aliasbench.scenes.errors import InputError
+from aliasbench.scenes.gltf_materials import FREE_TEXELS, TEXELS_PER_BYTE
 from aliasbench.scenes.inline_data import DATA_PREFIX, decode_image
 from aliasbench.scenes.limits import COUNT
-from aliasbench.scenes.model import Checker, Grating, ImageTexture, Texture, ZonePlate
+from aliasbench.scenes.local_files import is_local
+from aliasbench.scenes.model import TEXTURE_KINDS, Checker, Grating, ImageTexture, Texture, ZonePlate
 from aliasbench.scenes.photographs import SOURCE_PREFIX, load_photograph
 from aliasbench.scenes.schema import Table, shown
-from aliasbench.scenes.textures import load_image
+from aliasbench.scenes.textures import MOST_TEXELS, load_image
 
-_KINDS = ("checker", "image", "grating", "zone_plate")
+_KINDS = tuple(TEXTURE_KINDS.values())
 
 
 def read_textures(table: Table, folder: Path) -> dict[str, Texture]:
     """Return the textures of the table `texture` by name; image paths are relative to `folder`."""
     textures: dict[str, Texture] = {}
+    images = _Images(folder)
     for name in table.values:
         # The stand-in keeps objects from being told that there is no such texture.
-        textures[name] = table.problems.attempt(_reader(table, name, folder)) or Checker((1.0, 1.0))
+        textures[name] = table.problems.attempt(_reader(table, name, images)) or Checker((1.0, 1.0))
     return textures
 
 
-def _reader(table: Table, name: str, folder: Path) -> Callable[[], Texture]:
-    return lambda: _read_texture(table.table(name), folder)
+def _reader(table: Table, name: str, images: "_Images") -> Callable[[], Texture]:
+    return lambda: _read_texture(table.table(name), images)
 
 
-def _read_texture(table: Table, folder: Path) -> Texture:
+def _read_texture(table: Table, images: "_Images") -> Texture:
     table.check_keys((*_KINDS, "alpha_cutoff", "source"))
     kind = table.check_exclusive(_KINDS, "a texture")
     for key in ("alpha_cutoff", "source"):
         if table.has(key) and kind != "image":
             table.report(key, "left out: it belongs to textures with an image")
     if kind == "image":
-        return _read_image(table, folder)
+        return _read_image(table, images)
     inner = table.table(kind)
     if kind == "checker":
         inner.check_keys(("squares", "black", "white"))
@@ -67,7 +70,7 @@ def _read_texture(table: Table, folder: Path) -> Texture:
     )
 
 
-def _read_image(table: Table, folder: Path) -> ImageTexture:
+def _read_image(table: Table, images: "_Images") -> ImageTexture:
     given = table.text("image")
     cutoff = table.number("alpha_cutoff", at_least=0.0, at_most=1.0) if table.has("alpha_cutoff") else None
     source = None
@@ -81,7 +84,7 @@ def _read_image(table: Table, folder: Path) -> ImageTexture:
     if not given:
         table.problems.give_up()
     try:
-        image = _load(given, folder, cutoff)
+        image = images.load(given, cutoff)
     except InputError as error:
         table.problems.refuse(place, f"{table.where('image')}: {error}")
     except (OSError, ValueError) as error:
@@ -91,17 +94,50 @@ def _read_image(table: Table, folder: Path) -> ImageTexture:
     return image if source is None else replace(image, source=source)
 
 
-def _load(given: str, folder: Path, cutoff: float | None) -> ImageTexture:
-    if given.startswith(SOURCE_PREFIX):
-        return load_photograph(given, cutoff)
-    if not given.startswith(DATA_PREFIX):
-        return load_image(folder / given, alpha_cutoff=cutoff, source=given)
-    suffix, content = decode_image(given)
-    with tempfile.TemporaryDirectory(prefix="aliasbench-") as temporary:
-        path = Path(temporary) / f"inlined{suffix}"
-        path.write_bytes(content)
-        try:
-            return replace(load_image(path, alpha_cutoff=cutoff, label="the image in the data"), source="")
-        except InputError as error:
-            # The image library names the file that it was given.
-            raise InputError(str(error).replace(f" ({path})", "").replace(str(path), "it")) from None
+class _Images:
+    """The images of one scene file: each is read once, and all together stay within what a file may ask for.
+
+    Parameters
+    ----------
+    folder : Path
+        To which paths are relative.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._loaded: dict[str, ImageTexture] = {}
+        self._texels = 0
+        self._bytes = 0
+
+    def load(self, given: str, cutoff: float | None) -> ImageTexture:
+        """Return the image of a path, a photograph's name or a data URI."""
+        if given.startswith(SOURCE_PREFIX):
+            return load_photograph(given, cutoff)
+        if given not in self._loaded:
+            image = self._inlined(given) if given.startswith(DATA_PREFIX) else self._beside(given)
+            self._texels += image.texels.size // 4
+            self._loaded[given] = image
+        return replace(self._loaded[given], alpha_cutoff=cutoff)
+
+    def _beside(self, given: str) -> ImageTexture:
+        path = self._folder / given
+        if is_local(path):
+            self._bytes += path.stat().st_size
+        return load_image(path, source=given, most_texels=self._left())
+
+    def _inlined(self, given: str) -> ImageTexture:
+        suffix, content = decode_image(given)
+        self._bytes += len(content)
+        with tempfile.TemporaryDirectory(prefix="aliasbench-") as temporary:
+            path = Path(temporary) / f"inlined{suffix}"
+            path.write_bytes(content)
+            try:
+                image = load_image(path, label="the image in the data", most_texels=self._left())
+            except InputError as error:
+                # The image library names the file that it was given.
+                raise InputError(str(error).replace(f" ({path})", "").replace(str(path), "it")) from None
+        return replace(image, source="")
+
+    def _left(self) -> int:
+        """Return how many texels the next image may have."""
+        return max(0, min(MOST_TEXELS, max(FREE_TEXELS, TEXELS_PER_BYTE * self._bytes) - self._texels))

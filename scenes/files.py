@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from aliasbench.scenes.catalog import SCENES, build_scene
-from aliasbench.scenes.errors import InputError, shortened, unknown_name
+from aliasbench.scenes.errors import InputError, reason_of, shortened, unknown_name
 from aliasbench.scenes.facts import read_facts
 from aliasbench.scenes.file_objects import SHAPES, Pieces, read_light, read_name, read_object
 from aliasbench.scenes.file_textures import read_textures
@@ -29,8 +29,11 @@ from aliasbench.scenes.limits import (
     RADIANCE,
     camera_fault,
     end_of,
+    name_of_stem,
     reach_fault,
 )
+from aliasbench.scenes.lines import excess
+from aliasbench.scenes.local_files import open_input
 from aliasbench.scenes.meshes import MODEL_SUFFIXES, load_model_scene
 from aliasbench.scenes.model import Animation, Camera, Facts, Scene, Surface, Texture
 from aliasbench.scenes.problems import Problems
@@ -38,7 +41,9 @@ from aliasbench.scenes.projection import view_at
 from aliasbench.scenes.schema import Table
 
 SCHEMA = 1
+NO_MEMORY = "needs more memory than there is"
 _ROOT = ("schema", "name", "background", "contrast", "animation", "camera", "object", "texture", "light", "fact")
+_PROJECTIONS = ("orthographic", "perspective")
 _CAMERA = (
     *("projection", "position", "target", "up", "height", "fov_y_deg"),
     *("velocity", "target_velocity", "lens_radius", "focus_distance"),
@@ -64,7 +69,15 @@ def load_scene(text: str) -> Scene:
     """
     if not isinstance(text, str):
         raise TypeError(f"a scene is named by a text (of the catalog, or a file's path), not by {type(text).__name__}")
-    given = text.strip()
+    try:
+        return _load(text.strip())
+    except MemoryError as error:
+        raise InputError(f"{text.strip()}: {NO_MEMORY}") from error
+    except OSError as error:
+        raise InputError(f"{text.strip()}: cannot be read ({reason_of(error)})") from error
+
+
+def _load(given: str) -> Scene:
     path = Path(given)
     if path.suffix.lower() in MODEL_SUFFIXES:
         return load_model_scene(path)
@@ -122,9 +135,10 @@ def read_root(root: Table, folder: Path, stem: str) -> Scene:
             _check_reach(table, pieces, camera, animation)
         objects += pieces.surfaces
         brought |= pieces.textures
+    most = MAX_CATALOG_NAME if _is_of_catalog(root.values.get("name")) else MAX_NAME
     checked = objects if staged and problems.sound_since(after_textures) else []
     return Scene(
-        name=read_name(root, stem, MAX_CATALOG_NAME if _is_of_catalog(root.values.get("name")) else MAX_NAME),
+        name=read_name(root, name_of_stem(stem), most),
         camera=camera,
         objects=tuple(objects),
         textures=textures | brought,
@@ -155,7 +169,7 @@ def read_text(path: Path) -> str:
     """Return the text of a scene file; raise `InputError` if it cannot be read or is no text of a sensible size."""
     file = str(path)
     try:
-        with path.open("rb") as stream:
+        with open_input(path) as stream:
             content = stream.read(MAX_FILE_BYTES + 1)
         if len(content) > MAX_FILE_BYTES:
             raise InputError(f"{file}: is over {MAX_FILE_BYTES >> 20} MiB; no scene file may be")
@@ -166,12 +180,15 @@ def read_text(path: Path) -> str:
     except (OSError, ValueError) as error:
         if isinstance(error, InputError):
             raise
-        reason = getattr(error, "strerror", None) or str(error)
-        raise InputError(f"{file}: cannot be read ({reason}); the path of a scene file (.toml) is needed") from error
+        raise InputError(
+            f"{file}: cannot be read ({reason_of(error)}); the path of a scene file (.toml) is needed"
+        ) from error
 
 
 def parse_toml(text: str, file: str) -> dict[str, object]:
     """Return the tables of a TOML text; raise `InputError` with line and column if it is none."""
+    if (found := excess(text)) is not None:
+        raise InputError(f"{file}: line {found[0]}: {found[1]}; no scene file needs that")
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -206,9 +223,10 @@ def _read_animation(table: Table) -> Animation:
 def _read_camera(table: Table, animation: Animation) -> Camera:
     mark = table.problems.mark()
     table.check_keys(_CAMERA)
-    flat = table.choice("projection", ("orthographic", "perspective"), "orthographic") == "orthographic"
+    flat = table.choice("projection", _PROJECTIONS, "orthographic") == "orthographic"
+    is_known = table.values.get("projection", "orthographic") in _PROJECTIONS
     for key, wanted in (("fov_y_deg", "perspective"), ("height", "orthographic")):
-        if table.has(key) and flat != (wanted == "orthographic"):
+        if is_known and table.has(key) and flat != (wanted == "orthographic"):
             table.report(key, f'left out: it belongs to projection = "{wanted}"')
     camera = Camera(
         projection="orthographic" if flat else "perspective",
@@ -241,7 +259,12 @@ def _check_reach(table: Table, pieces: Pieces, camera: Camera, animation: Animat
     for surface in pieces.surfaces:
         if (fault := reach_fault(surface, camera, animation)) is not None:
             key, allowed = fault
-            table.report(next(k for k in SHAPES if table.has(k)) if key == "shape" else key, allowed)
+            shape = next(k for k in SHAPES if table.has(k))
+            if key == "shape" or table.has(key):
+                table.report(shape if key == "shape" else key, allowed)
+            else:
+                # Its own animation: the scene file says nothing of a motion.
+                table.report(shape, f"a model with a {key} {allowed}")
 
 
 def _critical_times(camera: Camera, animation: Animation) -> list[float]:

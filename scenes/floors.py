@@ -29,9 +29,20 @@ SKY = (0.35, 0.55, 0.85)
 FLOOR_PHOTOS = ("brick", "grass", "gravel")
 
 
+def floor_camera(speed: float) -> Camera:
+    """Return a camera over a floor at y = 0, the horizon in sight, that moves sideways (world units per second)."""
+    pitch = math.radians(PITCH_DEG)
+    return Camera(
+        projection="perspective",
+        position=(0.0, EYE_HEIGHT, 0.0),
+        target=(0.0, EYE_HEIGHT - math.sin(pitch), -math.cos(pitch)),
+        fov_y_deg=FOV_Y_DEG,
+        velocity=(speed, 0.0, 0.0),
+    )
+
+
 def build_floor(*, name: str, photo: str, speed: float, shutter: float) -> Scene:
     """Return the floor seen by a camera that moves sideways with `speed` (world units per second)."""
-    pitch = math.radians(PITCH_DEG)
     corners = [
         (-HALF_WIDTH, 0.0, NEAR_Z),
         (HALF_WIDTH, 0.0, NEAR_Z),
@@ -39,16 +50,9 @@ def build_floor(*, name: str, photo: str, speed: float, shutter: float) -> Scene
         (-HALF_WIDTH, 0.0, FAR_Z),
     ]
     floor = quad(corners, uv=[(x, -z) for x, _, z in corners], texture=photo, name="floor")
-    camera = Camera(
-        projection="perspective",
-        position=(0.0, EYE_HEIGHT, 0.0),
-        target=(0.0, EYE_HEIGHT - math.sin(pitch), -math.cos(pitch)),
-        fov_y_deg=FOV_Y_DEG,
-        velocity=(speed, 0.0, 0.0),
-    )
     return Scene(
         name=name,
-        camera=camera,
+        camera=floor_camera(speed),
         objects=(floor,),
         textures={photo: load_photograph(photo)},
         background=SKY,

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from aliasbench.scenes.limits import MIN_LENGTH
-from aliasbench.scenes.model import Animation, Camera, FloatArray, Surface, Vec3
+from aliasbench.scenes.model import Animation, Camera, FloatArray, Surface, as_vec3
 from aliasbench.scenes.motion import object_matrix
 
 FOV_Y_DEG = 35.0
@@ -20,11 +20,13 @@ AZIMUTH_DEG, ELEVATION_DEG = 30.0, 20.0  # from +z towards +x, and up
 _MARGIN = 0.9  # of the picture's half height
 _MOST_SWEPT = 10_000  # vertices
 _MOMENTS = 16  # at which a moving surface is looked at
+_CHUNK = 2**15  # points: what is computed of them stays in the cache
 
 
 def frame_surfaces(surfaces: Sequence[Surface], animation: Animation) -> Camera:
     """Return a camera that has all surfaces in view, over the whole animation where they move."""
-    points = np.concatenate([_swept(surface, animation) for surface in surfaces])
+    swept = [_swept(surface, animation) for surface in surfaces]
+    points = swept[0] if len(swept) == 1 else np.concatenate(swept)
     low, high = points.min(axis=0), points.max(axis=0)
     center = (low + high) / 2
     azimuth, elevation = math.radians(AZIMUTH_DEG), math.radians(ELEVATION_DEG)
@@ -34,34 +36,35 @@ def frame_surfaces(surfaces: Sequence[Surface], animation: Animation) -> Camera:
     right = np.array([math.cos(azimuth), 0.0, -math.sin(azimuth)])
     axes = np.stack([right, np.cross(back, right), back])
     k = _MARGIN * math.tan(math.radians(FOV_Y_DEG) / 2)
-    x, y, z = np.ascontiguousarray((points - center) @ axes.T).T.copy()
-    size = max(float(np.abs(a).max()) for a in (x, y, z))
-    distance = _distance(x, y, z, k, size)
+    seen = np.empty((3, len(points)))
+    chunks = [slice(start, start + _CHUNK) for start in range(0, len(points), _CHUNK)]
+    for chunk in chunks:
+        seen[:, chunk] = axes @ (points[chunk] - center).T
+    size = float(max(seen.max(), -seen.min()))
+    nearest = float(seen[2].max()) + 0.01 * size
+    # Of both sides of the picture, left and right, bottom and top: a shift of the view adds to one what it takes away
+    # from the other, so that the points are not looked at again.
+    reach = np.array(
+        [[max(float((s * seen[a, c] / k + seen[2, c]).max()) for c in chunks) for a in (0, 1)] for s in (-1, 1)]
+    )
+    shift = np.zeros(2)
+    distance = max(float(reach.max()), nearest, MIN_LENGTH)
     for _ in range(4):
         # Perspective shows near parts larger: look at the middle of the picture of the model, not of its box.
-        depth = distance - z
-        middle = np.array([_middle(x / depth), _middle(y / depth)]) * distance
-        center = center + middle @ axes[:2]
-        x -= middle[0]
-        y -= middle[1]
-        distance = _distance(x, y, z, k, size)
+        low, high = np.full(2, np.inf), np.full(2, -np.inf)
+        for chunk in chunks:
+            picture = (seen[:2, chunk] - shift[:, None]) / (distance - seen[2, chunk])
+            low, high = np.minimum(low, picture.min(axis=1)), np.maximum(high, picture.max(axis=1))
+        shift = shift + (low + high) / 2 * distance
+        distance = max(float((reach + np.array([[1.0], [-1.0]]) * shift / k).max()), nearest, MIN_LENGTH)
+    center = center + shift @ axes[:2]
     return Camera(
         projection="perspective",
-        position=_vec3(center + distance * back),
-        target=_vec3(center),
+        position=as_vec3(center + distance * back),
+        target=as_vec3(center),
         up=(0.0, 1.0, 0.0),
         fov_y_deg=FOV_Y_DEG,
     )
-
-
-def _middle(values: FloatArray) -> float:
-    return float(values.min() + values.max()) / 2
-
-
-def _distance(x: FloatArray, y: FloatArray, z: FloatArray, k: float, size: float) -> float:
-    """Return the least distance from which all points are in view, and in front of the eye by a share of their size."""
-    reach = max(float((np.abs(a) / k + z).max()) for a in (x, y))
-    return max(reach, float(z.max()) + 0.01 * size, MIN_LENGTH)
 
 
 def _swept(surface: Surface, animation: Animation) -> FloatArray:
@@ -79,8 +82,3 @@ def _swept(surface: Surface, animation: Animation) -> FloatArray:
         matrix = object_matrix(surface.motion, animation, 0, moment)
         swept.append(points @ matrix[:3, :3].T + matrix[:3, 3])
     return np.concatenate(swept)
-
-
-def _vec3(values: FloatArray) -> Vec3:
-    x, y, z = (values + 0.0).tolist()
-    return (x, y, z)

@@ -2,14 +2,14 @@
 
 What is read: the default scene's nodes with their transforms (matrices, translation, rotation and scale, mirrored and
 instanced ones), triangles, strips and fans of all their meshes, indexed or not, base colours and textures
-(`gltf_materials`), vertex colours (COLOR_0), the first camera, the first animation where it is rigid and steady
-(`gltf_animation`). Points and lines have no area and are left out; skins and morph targets stay in their rest shape, a
-skinned mesh where its own coordinates put it, as the specification says of the node it hangs on.
+(`gltf_materials`), vertex colours (COLOR_0) with their alpha, the first camera, the first animation where it is rigid
+and steady (`gltf_animation`). Points and lines have no area and are left out; skins and morph targets stay in their
+rest shape, a skinned mesh where its own coordinates put it, as the specification says of the node it hangs on.
 """
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,10 +21,11 @@ from aliasbench.scenes.gltf_materials import Look, TextureReader, read_look
 from aliasbench.scenes.gltf_nodes import Placed, walk_nodes
 from aliasbench.scenes.limits import COUNT, LENGTH, MIN_FOV_DEG, MIN_LENGTH, RADIANCE
 from aliasbench.scenes.mesh_parts import Indices, Part, check_amount
-from aliasbench.scenes.model import Camera, FloatArray, ImageTexture, Motion, Vec3
+from aliasbench.scenes.model import Camera, FloatArray, ImageTexture, Motion, Vec3, as_vec3
 from aliasbench.scenes.schema import Table
 
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
+_ROUNDING = 1e-6  # of alpha in float32
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,8 +51,10 @@ class _Primitive:
     place: str
 
 
-def read_gltf(document: Document, label: str) -> GltfModel:
+def read_gltf(document: Document, label: str, *, retextured: bool = False) -> GltfModel:
     """Return the model of a document; its textures' names begin with `label`.
+
+    Where it is to be `retextured` no image is read, and coordinates are those in which the model's pictures are.
 
     Raises
     ------
@@ -62,21 +65,21 @@ def read_gltf(document: Document, label: str) -> GltfModel:
     animated, duration = read_animation(document)
     placed = list(walk_nodes(document, animated))
     shown = [(place, found[0]) for place in placed if (found := document.follow(place.node, "mesh", "meshes"))]
-    vertices = triangles = 0
-    counts: dict[int, tuple[int, int]] = {}
+    counts: dict[int, tuple[int, int, int, int]] = {}
     for _, mesh in shown:
         if mesh not in counts:
             counts[mesh] = _amount(document, document.lists["meshes"][mesh])
-        vertices, triangles = vertices + counts[mesh][0], triangles + counts[mesh][1]
-    check_amount(file, vertices, triangles, document.size)
-    reader = TextureReader(document, label)
+    vertices, triangles, colored, drawn = (sum(counts[mesh][k] for _, mesh in shown) for k in range(4))
+    check_amount(file, vertices, triangles, document.size, colored=colored, parts=drawn)
+    reader = TextureReader(document, label, retextured=retextured)
     looks: dict[int | None, Look] = {}
+    hidden: list[str] = []  # why parts are not drawn
     meshes: dict[int, list[_Primitive]] = {}
     parts: list[Part] = []
     for place, mesh in shown:
         if mesh not in meshes:
             tables = entries(document.lists["meshes"][mesh], "primitives")
-            meshes[mesh] = [p for t in tables if (p := _read_primitive(document, t, reader, looks)) is not None]
+            meshes[mesh] = [p for t in tables if (p := _read_primitive(document, t, reader, looks, hidden)) is not None]
         skinned = place.node.has("skin")
         for primitive in meshes[mesh]:
             matrix = np.eye(4) if skinned else place.matrix
@@ -92,12 +95,16 @@ def read_gltf(document: Document, label: str) -> GltfModel:
                     place=primitive.place,
                 )
             )
+    if hidden and not parts:
+        raise InputError(f"{file}: all of its parts are transparent: {hidden[0]}")
     return GltfModel(parts, reader.textures, _first_camera(document, placed), duration)
 
 
-def _amount(document: Document, mesh: Table) -> tuple[int, int]:
-    """Return how many vertices and triangles a mesh says it has, before anything of it is read."""
-    vertices = triangles = 0
+def _amount(document: Document, mesh: Table) -> tuple[int, int, int, int]:
+    """Return how many vertices, triangles, triangles with colours at their corners, and primitives with triangles a
+    mesh says it has, unread.
+    """
+    vertices = triangles = colored = drawn = 0
     for primitive in entries(mesh, "primitives"):
         found = document.follow(primitive.table("attributes"), "POSITION", "accessors")
         if found is None or _mode(primitive) not in (_TRIANGLES, _STRIP, _FAN):
@@ -105,13 +112,16 @@ def _amount(document: Document, mesh: Table) -> tuple[int, int]:
         indexed = document.follow(primitive, "indices", "accessors")
         own = found[1].whole("count", at_least=1)
         corners = own if indexed is None else indexed[1].whole("count", at_least=1)
+        drawn += 1
         vertices += own
-        triangles += corners // 3 if _mode(primitive) == _TRIANGLES else max(0, corners - 2)
-    return vertices, triangles
+        cut = corners // 3 if _mode(primitive) == _TRIANGLES else max(0, corners - 2)
+        triangles += cut
+        colored += cut if primitive.table("attributes").has("COLOR_0") else 0
+    return vertices, triangles, colored, drawn
 
 
 def _read_primitive(
-    document: Document, primitive: Table, reader: TextureReader, looks: dict[int | None, Look]
+    document: Document, primitive: Table, reader: TextureReader, looks: dict[int | None, Look], hidden: list[str]
 ) -> _Primitive | None:
     """Return a primitive's arrays, None where it draws nothing: points, lines, or nothing left by its alpha."""
     attributes = primitive.table("attributes")
@@ -124,9 +134,26 @@ def _read_primitive(
         looks[number] = read_look(document, None if material is None else material[1])
     look = looks[number]
     if look.absent:
+        hidden.append(look.absent)
         return None
     positions = _attribute(document, attributes, "POSITION", ("VEC3",), LENGTH)
     triangles = _triangles(document, primitive, len(positions))
+    colors = None
+    if attributes.has("COLOR_0"):
+        colors = _attribute(document, attributes, "COLOR_0", ("VEC3", "VEC4"), RADIANCE, positions)
+        before = len(triangles)
+        look, triangles = _cut_out(look, colors, triangles)
+        if before and len(triangles) == 0:
+            hidden.append(f"the alpha of COLOR_0 of {primitive.path} is below {look.cutoff:g}")
+        colors = None if look.is_emitted else colors[:, :3]
+    color = look.color
+    if any(look.emissive):
+        if colors is None:
+            color = _sum(color, look.emissive)
+        else:
+            color, colors = (1.0, 1.0, 1.0), np.minimum(colors * color + look.emissive, RADIANCE)
+    if len(triangles) == 0:
+        return None
     texture, uv = None, None
     if look.image is not None:
         key = f"TEXCOORD_{look.uv_set}"
@@ -137,10 +164,27 @@ def _read_primitive(
         # A scene file may put a texture of its own on the mesh.
         uv = _attribute(document, attributes, "TEXCOORD_0", ("VEC2",), COUNT, positions)
         uv[:, 1] = 1.0 - uv[:, 1]
-    colors = None
-    if attributes.has("COLOR_0"):
-        colors = _attribute(document, attributes, "COLOR_0", ("VEC3", "VEC4"), RADIANCE, positions)[:, :3]
-    return _Primitive(positions, triangles, uv, texture, look.color, colors, primitive.path)
+    return _Primitive(positions, triangles, uv, texture, color, colors, primitive.path)
+
+
+def _sum(a: Vec3, b: Vec3) -> Vec3:
+    red, green, blue = (min(x + y, RADIANCE) for x, y in zip(a, b, strict=True))
+    return (red, green, blue)
+
+
+def _cut_out(look: Look, colors: FloatArray, triangles: Indices) -> tuple[Look, Indices]:
+    """Return a look and the triangles that are left of a primitive by the alpha of its vertex colours (n, 3 or 4).
+
+    As with colours: a triangle has the mean of its corners', and a texture is multiplied by that of all that are left.
+    """
+    if look.cutoff is None or colors.shape[1] == 3 or len(triangles) == 0:
+        return look, triangles
+    alpha = np.clip(colors[:, 3], 0.0, 1.0)[triangles].mean(axis=1)
+    alive = alpha >= look.cutoff - _ROUNDING
+    if not alive.any():
+        return look, triangles[:0]
+    mean = float(alpha[alive].mean())
+    return replace(look, cutoff=look.cutoff / mean if mean > 0.0 else None), triangles[alive]
 
 
 def _mode(primitive: Table) -> int:
@@ -209,9 +253,9 @@ def _first_camera(document: Document, placed: Sequence[Placed]) -> Camera | None
         flat = kind == "orthographic"
         return Camera(
             projection="orthographic" if flat else "perspective",
-            position=_vec3(eye),
-            target=_vec3(eye + forward * max(1.0, float(np.abs(eye).max()))),
-            up=_vec3(up),
+            position=as_vec3(eye),
+            target=as_vec3(eye + forward * max(1.0, float(np.abs(eye).max()))),
+            up=as_vec3(up),
             height=2 * lens.number("ymag", at_least=MIN_LENGTH, at_most=LENGTH / 2) if flat else None,
             fov_y_deg=None if flat else math.degrees(_fov(lens)),
             velocity=(0.0, 0.0, 0.0) if place.motion.spin is not None else place.motion.velocity,
@@ -221,8 +265,3 @@ def _first_camera(document: Document, placed: Sequence[Placed]) -> Camera | None
 
 def _fov(lens: Table) -> float:
     return lens.number("yfov", at_least=math.radians(MIN_FOV_DEG), below=math.pi)
-
-
-def _vec3(values: FloatArray) -> Vec3:
-    x, y, z = (values + 0.0).tolist()
-    return (x, y, z)

@@ -10,14 +10,14 @@ over the whole animation are rounded to a degree where they are within a few mil
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from aliasbench.scenes.errors import InputError
 from aliasbench.scenes.gltf_document import Document, as_reals, entries
 from aliasbench.scenes.limits import LENGTH
-from aliasbench.scenes.model import FloatArray, Vec3
+from aliasbench.scenes.model import FloatArray, Vec3, as_vec3
 from aliasbench.scenes.schema import Table
 
 _WIDTH: Mapping[str, int] = {"translation": 3, "rotation": 4, "scale": 3}
@@ -25,6 +25,7 @@ _PATHS = (*_WIDTH, "weights", "pointer")
 _SAME = 2e-5  # of a path's extent: how far from it keys may lie
 _SHORTEST_S, _LONGEST_S = 1e-3, 3600.0
 _SNAP = 3e-6  # turns
+_MOST_KEYS = 10_000_000  # of all channels that differ: some seconds
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,11 +53,15 @@ class NodeAnimation:
     motion: LocalMotion | None
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True)
 class _Channel:
-    times: FloatArray
-    values: FloatArray
-    linear: bool
+    """What the keys of one path come to; they themselves are let go, since a file may have many."""
+
+    start: float
+    end: float
+    first: tuple[float, ...]
+    is_constant: bool
+    motion: LocalMotion | None  # None where they are no steady motion
 
 
 def read_animation(document: Document) -> tuple[dict[int, NodeAnimation], float]:
@@ -66,6 +71,8 @@ def read_animation(document: Document) -> tuple[dict[int, NodeAnimation], float]
     animation = document.lists["animations"][0]
     samplers = entries(animation, "samplers")
     channels: dict[int, dict[str, _Channel]] = {}
+    known: dict[tuple[object, ...], _Channel] = {}
+    keys = 0
     for channel in entries(animation, "channels"):
         target = channel.table("target")
         path = target.choice("path", _PATHS, "weights")
@@ -75,19 +82,30 @@ def read_animation(document: Document) -> tuple[dict[int, NodeAnimation], float]
         index = channel.whole("sampler", at_least=0)
         if index >= len(samplers):
             channel.refuse("sampler", f"an index of its samplers, of which there are {len(samplers)}")
-        channels.setdefault(found[0], {})[path] = _read_channel(document, samplers[index], path)
+        sampler = samplers[index]
+        # Many channels may have the same keys, and many samplers.
+        content = (path, *(str(sampler.values.get(key)) for key in ("input", "output", "interpolation")))
+        if content not in known:
+            times = document.follow(sampler, "input", "accessors")
+            keys += 0 if times is None else times[1].whole("count", at_least=1)
+            if keys > _MOST_KEYS:
+                raise InputError(
+                    f"{animation.file}: {animation.path}: has more than {_MOST_KEYS} keys; fewer are allowed"
+                )
+            known[content] = _read_channel(document, sampler, path)
+        channels.setdefault(found[0], {})[path] = known[content]
     every = [c for paths in channels.values() for c in paths.values()]
     if not every:
         return {}, 0.0
-    start, end = min(c.times[0] for c in every), max(c.times[-1] for c in every)
+    start, end = min(c.start for c in every), max(c.end for c in every)
     playable = _SHORTEST_S <= end - start <= _LONGEST_S
     return {
         node: NodeAnimation(
-            {path: tuple(c.values[0].tolist()) for path, c in paths.items()},
-            _motion(paths, float(start), float(end)) if playable else None,
+            {path: c.first for path, c in paths.items()},
+            _motion(paths, start, end) if playable else None,
         )
         for node, paths in channels.items()
-    }, float(end - start) if playable else 0.0
+    }, end - start if playable else 0.0
 
 
 def _read_channel(document: Document, sampler: Table, path: str) -> _Channel:
@@ -112,51 +130,54 @@ def _read_channel(document: Document, sampler: Table, path: str) -> _Channel:
                 f"{place}: has a quaternion of length {float(lengths.min()):g}; unit quaternions are needed"
             )
         values = values / lengths
-    return _Channel(times, values, kind == "LINEAR")
+    motion = None
+    if kind == "LINEAR" and len(times) > 1:
+        motion = (
+            _velocity(times, values)
+            if path == "translation"
+            else _turning(times, values)
+            if path == "rotation"
+            else None
+        )
+    first: tuple[float, ...] = tuple(values[0].tolist())
+    return _Channel(float(times[0]), float(times[-1]), first, _is_constant(values), motion)
 
 
 def _motion(paths: Mapping[str, _Channel], start: float, end: float) -> LocalMotion | None:
     """Return the one motion of a node's channels, None where they are none."""
-    velocity, axis, rate = (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 0.0
+    out = LocalMotion()
     for path, channel in paths.items():
-        if _is_constant(channel):
+        if channel.is_constant:
             continue
-        covers = channel.times[0] - start <= _SAME * (end - start) and end - channel.times[-1] <= _SAME * (end - start)
-        if not channel.linear or not covers or path == "scale":
+        covers = channel.start - start <= _SAME * (end - start) and end - channel.end <= _SAME * (end - start)
+        if channel.motion is None or not covers:
             return None
         if path == "translation":
-            line = _velocity(channel)
-            if line is None:
-                return None
-            velocity = line
+            out = replace(out, velocity=channel.motion.velocity)
         else:
-            turning = _turning(channel)
-            if turning is None:
-                return None
-            axis, rate = turning
-    return LocalMotion(velocity, axis, rate)
+            out = replace(out, axis=channel.motion.axis, rev_per_s=channel.motion.rev_per_s)
+    return out
 
 
-def _is_constant(channel: _Channel) -> bool:
-    first = channel.values[0]
-    return bool(np.abs(channel.values - first).max() <= 1e-6 * max(float(np.abs(first).max()), 1e-6))
+def _is_constant(values: FloatArray) -> bool:
+    first = values[0]
+    return bool(np.abs(values - first).max() <= 1e-6 * max(float(np.abs(first).max()), 1e-6))
 
 
-def _velocity(channel: _Channel) -> Vec3 | None:
-    t = channel.times - channel.times[0]
-    x = channel.values - channel.values[0]
+def _velocity(times: FloatArray, values: FloatArray) -> LocalMotion | None:
+    t = times - times[0]
+    x = values - values[0]
     velocity = x[-1] / t[-1]
-    rounding = 1e-6 * np.abs(channel.values).max() + _SAME * np.abs(x).max()
+    rounding = 1e-6 * np.abs(values).max() + _SAME * np.abs(x).max()
     if np.abs(x - t[:, None] * velocity).max() > rounding or not velocity.any():
         return None
-    a, b, c = velocity.tolist()
-    return (a, b, c)
+    return LocalMotion(velocity=as_vec3(velocity))
 
 
-def _turning(channel: _Channel) -> tuple[Vec3, float] | None:
-    """Return the axis and the revolutions per second of quaternion keys (x, y, z, w) at a constant rate."""
-    v0, w0 = channel.values[:-1, :3], channel.values[:-1, 3:]
-    v1, w1 = channel.values[1:, :3], channel.values[1:, 3:]
+def _turning(times: FloatArray, values: FloatArray) -> LocalMotion | None:
+    """Return the rotation of quaternion keys (x, y, z, w) at a constant rate."""
+    v0, w0 = values[:-1, :3], values[:-1, 3:]
+    v1, w1 = values[1:, :3], values[1:, 3:]
     # q1 times the conjugate of q0: what turns the one into the other, in the parent's axes
     vector = w0 * v1 - w1 * v0 - np.cross(v1, v0)
     scalar = (w0 * w1)[:, 0] + (v0 * v1).sum(axis=1)
@@ -164,10 +185,10 @@ def _turning(channel: _Channel) -> tuple[Vec3, float] | None:
     vector = np.where((scalar < -1e-6)[:, None], -vector, vector)
     sines = np.linalg.norm(vector, axis=1)
     angles = 2 * np.arctan2(sines, np.abs(scalar))
-    total, dt = float(angles.sum()), np.diff(channel.times)
+    total, dt = float(angles.sum()), np.diff(times)
     mean = vector.sum(axis=0)
     length = float(np.linalg.norm(mean))
-    duration = float(channel.times[-1] - channel.times[0])
+    duration = float(times[-1] - times[0])
     if length < 0.999 * float(sines.sum()) or length == 0.0:
         return None
     axis = mean / length
@@ -181,4 +202,4 @@ def _turning(channel: _Channel) -> tuple[Vec3, float] | None:
         turns = degrees / 360
     x, y, z = np.where(np.abs(axis) < 1e-6, 0.0, axis).tolist()
     size = math.hypot(x, y, z)
-    return (x / size, y / size, z / size), turns / duration
+    return LocalMotion(axis=(x / size, y / size, z / size), rev_per_s=turns / duration)

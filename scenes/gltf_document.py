@@ -5,10 +5,7 @@ what there is before it is followed. Counts are bounded by bytes that exist: no 
 Source: Khronos, glTF 2.0 specification (ISO/IEC 12113), sections 3.6 (binary data) and 4 (GLB).
 """
 
-import base64
-import binascii
 import json
-import re
 import struct
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -17,8 +14,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from aliasbench.scenes.errors import InputError, shortened, unknown_name
-from aliasbench.scenes.local_files import path_beside, read_local
+from aliasbench.scenes.errors import InputError, unknown_name
+from aliasbench.scenes.gltf_buffers import Buffers
+from aliasbench.scenes.local_files import read_head, read_local, size_of_local
 from aliasbench.scenes.problems import Problems
 from aliasbench.scenes.schema import Table
 
@@ -28,7 +26,8 @@ LISTS = (
 )
 _EXTENSIONS = ("KHR_texture_transform", "KHR_mesh_quantization", "KHR_lights_punctual", "KHR_node_visibility")
 _MOST_MARKS = 4_000_000  # brackets and commas: what the JSON comes to in memory
-_DATA_URI = re.compile(r"data:[\w.+/-]*(;[\w.+=-]*)*?;base64,", re.ASCII)
+_MOST_TEXT = 64_000_000  # bytes of JSON
+_MOST_NODES = 100_000
 _COMPONENTS: Mapping[int, str] = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _WIDTHS: Mapping[str, int] = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 
@@ -42,7 +41,7 @@ class Document:
     root : Table
     lists : mapping of str to sequence of Table
         The entries of the top-level lists (`LISTS`).
-    buffers : sequence of (n,) uint8
+    buffers : Buffers
     folder : Path
         Where the files that it names must be.
     size : int
@@ -51,7 +50,7 @@ class Document:
 
     root: Table
     lists: Mapping[str, Sequence[Table]]
-    buffers: Sequence[NDArray[np.uint8]]
+    buffers: Buffers
     folder: Path
     size: int
 
@@ -81,7 +80,7 @@ class Document:
         target = self.follow(view, "buffer", "buffers")
         if target is None:
             view.refuse("buffer", "an index of buffers")
-        buffer = self.buffers[target[0]]
+        buffer = self.buffers.bytes_of(target[0])
         start, length = view.whole("byteOffset", 0, at_least=0), view.whole("byteLength", at_least=1)
         if start + length > len(buffer):
             view.refuse("byteLength", f"at most {max(0, len(buffer) - start)}, what the buffer has from byte {start}")
@@ -161,8 +160,11 @@ def read_document(path: Path) -> Document:
         not there or not beside it.
     """
     file = str(path)
+    binary_form = read_head(path, file, 4) == b"glTF"
+    if not binary_form and (size := size_of_local(path, file)) > _MOST_TEXT:
+        raise InputError(f"{file}: is no GLB file, and has {size} bytes; at most {_MOST_TEXT} of glTF JSON are allowed")
     data = read_local(path, file)
-    text, binary = _split(data, file) if data[:4] == b"glTF" else (data, None)
+    text, binary = _split(data, file) if binary_form else (data, None)
     root = Table(Problems(file), "", _parse(text, file))
     version = root.table("asset").text("version")
     if not version.startswith("2."):
@@ -171,9 +173,12 @@ def read_document(path: Path) -> Document:
         if name not in _EXTENSIONS and not name.startswith("KHR_materials_"):
             problem = unknown_name("required extension", name, (*_EXTENSIONS, "KHR_materials_..."))
             raise InputError(f"{file}: extensionsRequired: {problem}")
+    nodes = root.values.get("nodes")
+    if isinstance(nodes, list) and len(nodes) > _MOST_NODES:
+        raise InputError(f"{file}: nodes: there are {len(nodes)}; at most {_MOST_NODES} are allowed")
     lists = {key: entries(root, key) for key in LISTS}
-    buffers = [_read_buffer(table, k, binary, path.parent) for k, table in enumerate(lists["buffers"])]
-    return Document(root, lists, buffers, path.parent, len(data) + sum(len(b) for b in buffers))
+    buffers = Buffers(lists["buffers"], binary, path.parent)
+    return Document(root, lists, buffers, path.parent, len(data) + buffers.size)
 
 
 def as_reals(values: NDArray[np.generic]) -> NDArray[np.float64]:
@@ -196,17 +201,6 @@ def _texts(table: Table, key: str) -> list[str]:
     if not isinstance(value, list) or not all(isinstance(name, str) for name in value):
         table.refuse(key, "a list of texts")
     return [str(name) for name in value]
-
-
-def decode_data_uri(uri: str, what: str) -> bytes:
-    """Return the bytes of a ``data:`` URI in base64."""
-    head = _DATA_URI.match(uri[:200])
-    if head is None:
-        raise InputError(f"{what}: {shortened(ascii(uri[:100]))} is no data URI in base64")
-    try:
-        return base64.b64decode(uri[head.end() :], validate=True)
-    except (binascii.Error, ValueError) as error:
-        raise InputError(f"{what}: its data URI is not valid base64 ({error})") from error
 
 
 def _component(table: Table, allowed: Sequence[str] = tuple(_COMPONENTS.values())) -> np.dtype[np.generic]:
@@ -241,6 +235,10 @@ def _split(data: bytes, file: str) -> tuple[bytes, bytes | None]:
 
 
 def _parse(text: bytes, file: str) -> dict[str, object]:
+    if len(text) > _MOST_TEXT:
+        raise InputError(f"{file}: has {len(text)} bytes of JSON; at most {_MOST_TEXT} are allowed")
+    if text[:100].removeprefix(b"\xef\xbb\xbf").lstrip()[:1] not in (b"{", b"[", b""):
+        raise InputError(f"{file}: is neither GLB nor glTF JSON, which begins with '{{'")
     if text.count(b",") + text.count(b"[") + text.count(b"{") > _MOST_MARKS:
         raise InputError(f"{file}: its JSON has more than {_MOST_MARKS} values; fewer are allowed")
     try:
@@ -254,22 +252,3 @@ def _parse(text: bytes, file: str) -> dict[str, object]:
     if not isinstance(document, dict):
         raise InputError(f"{file}: is no JSON object; a glTF file is one")
     return document
-
-
-def _read_buffer(table: Table, index: int, binary: bytes | None, folder: Path) -> NDArray[np.uint8]:
-    length = table.whole("byteLength", at_least=1)
-    what = f"{table.file}: {table.path}"
-    if not table.has("uri"):
-        if index != 0 or binary is None:
-            table.refuse("uri", "given: only the first buffer of a GLB file is inside it")
-        data = binary
-    else:
-        uri = table.text("uri")
-        if uri.startswith("data:"):
-            data = decode_data_uri(uri, what)
-        else:
-            path = path_beside(folder, uri, what, escaped=True)
-            data = read_local(path, f"{what}: buffer {str(path.name)!r}")
-    if length > len(data):
-        table.refuse("byteLength", f"at most {len(data)}, the bytes that are there (cut off?)")
-    return np.frombuffer(data, np.uint8)[:length]

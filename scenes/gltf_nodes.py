@@ -17,7 +17,7 @@ from aliasbench.scenes.errors import InputError
 from aliasbench.scenes.gltf_animation import LocalMotion, NodeAnimation
 from aliasbench.scenes.gltf_document import Document
 from aliasbench.scenes.limits import LENGTH
-from aliasbench.scenes.model import FloatArray, Motion, Spin, Vec3
+from aliasbench.scenes.model import FloatArray, Motion, Spin, as_vec3
 from aliasbench.scenes.schema import Table
 
 _SIMILAR = 1e-5  # how unevenly, relatively, a transform may scale what spins under it
@@ -105,12 +105,12 @@ def _enter(node: Table, above: _Carried, animated: NodeAnimation | None) -> _Car
             return _Carried(matrix, frozen=True)
         # A reflection turns about the reflected axis the other way.
         axis = linear @ np.array(moved.axis) * np.sign(np.linalg.det(linear)) / math.sqrt(scale)
-        spin = Spin(_vec3(axis), _vec3(matrix[:3, 3]), moved.rev_per_s)
+        spin = Spin(as_vec3(axis), as_vec3(matrix[:3, 3]), moved.rev_per_s)
     return _Carried(matrix, velocity, spin)
 
 
 def _motion(carried: _Carried) -> Motion:
-    return Motion() if carried.frozen else Motion(_vec3(carried.velocity), carried.spin)
+    return Motion() if carried.frozen else Motion(as_vec3(carried.velocity), carried.spin)
 
 
 def _local_matrix(node: Table, pose: Mapping[str, tuple[float, ...]]) -> FloatArray:
@@ -143,8 +143,3 @@ def _rotation(node: Table) -> tuple[float, ...]:
     if length < 0.5:
         node.refuse("rotation", "a unit quaternion, four numbers")
     return tuple(q / length for q in quaternion)
-
-
-def _vec3(values: FloatArray) -> Vec3:
-    x, y, z = (values + 0.0).tolist()
-    return (x, y, z)

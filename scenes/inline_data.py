@@ -15,6 +15,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from aliasbench.scenes.errors import shortened
 from aliasbench.scenes.model import FloatArray
 from aliasbench.scenes.schema import Table, between
 
@@ -48,7 +49,7 @@ def decode_image(text: str) -> tuple[str, bytes]:
     kind = head[1].lower().removeprefix("image/") if head else ""
     if head is None or kind not in IMAGE_SUFFIXES:
         known = ", ".join(f"data:image/{name};base64," for name in IMAGE_SUFFIXES)
-        raise ValueError(f"begins {text[: head.end() if head else 30]!r}; known: {known}")
+        raise ValueError(f"begins {shortened(text[: head.end() if head else 30])!r}; known: {known}")
     if len(text) > MAX_IMAGE_BYTES * 4 // 3:
         raise ValueError(f"holds more than {MAX_IMAGE_BYTES >> 20} MiB; put the image beside the scene file")
     return IMAGE_SUFFIXES[kind], _decode(text, head.end())

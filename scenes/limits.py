@@ -21,11 +21,16 @@ COUNT = 1e9
 MIN_FPS = 1e-6
 MAX_NAME = 200  # characters of a scene's or an object's name: it is shown in tables and stands in records
 MAX_CATALOG_NAME = 500  # of one that says with which parameters the catalog builds the scene
-MAX_FILE_BYTES = 512 * 2**20  # of a scene file
+MAX_FILE_BYTES = 128 * 2**20  # of a scene file; a mesh of a million triangles is 32 MB in one
 MIN_FOV_DEG = 1e-6  # 17 mm of picture a thousand kilometres away
 # Distance from the origin over the picture's height: beyond, rounding in float64 alone moves a point by a pixel of a
 # picture 1000 high. A picture of a millionth of a unit, a million units away, is well within.
 RESOLVED = 1e13
+
+
+def name_of_stem(stem: str) -> str:
+    """Return a scene's name from its file's, which may be anything."""
+    return "".join(c if c.isprintable() else "?" for c in stem)[:MAX_NAME]
 
 
 def end_of(animation: Animation) -> float:

@@ -17,8 +17,8 @@ _TOKEN = re.compile(
     |(?P<newline>\n)
     |(?P<string>\"\"\"(?:[^"\\]+|\\.|"(?!""))*+"{3,5}
         |'''(?:[^']+|'(?!''))*+'{3,5}
-        |"[^"\\\n]*+(?:\\.[^"\\\n]*+)*+"
-        |'[^'\n]*+')
+        |(?!\"\"\")"[^"\\\n]*+(?:\\.[^"\\\n]*+)*+"
+        |(?!''')'[^'\n]*+')
     |(?P<mark>[\[\]{}=,.])
     |(?P<bare>[^\s\[\]{}=,.\#"']+)
     """,
@@ -27,6 +27,11 @@ _TOKEN = re.compile(
 _KEY_BREAK = ("=", "]")
 # Keys deeper than this are taken for their table: no scene has any, and names of thousands of parts are a few bytes.
 DEEPEST = 12
+# What a text may have for the standard reader, which takes a time that grows with the square of a name's parts, and
+# up to two microseconds for each token, to read it within seconds. Data of scenes is in strings, each a single token.
+MOST_PARTS = 50
+MOST_NESTED = 100
+MOST_TOKENS = 5_000_000
 
 
 class _Tokens:
@@ -81,6 +86,38 @@ def key_lines(text: str) -> Mapping[Place, int]:
         else:
             _read_pair(tokens, table, lines)
     return lines
+
+
+def excess(text: str) -> tuple[int, str] | None:
+    """Return the line of a text, TOML or not, from which on it asks too much of a reader, and what is too much there.
+
+    None where it asks nothing of the kind. The time grows with the text's length alone: what is no token ends the
+    search, as it ends the reading.
+    """
+    end = parts = nested = 0
+    too_much = None
+    for count, match in enumerate(_TOKEN.finditer(text)):
+        if match.start() != end:
+            return None
+        begin, end = match.span()
+        if match.lastgroup == "mark":
+            mark = text[begin]
+            parts = parts + 1 if mark == "." else 0
+            if mark in "[{":
+                nested += 1
+            elif mark in "]}":
+                nested -= 1
+            if parts >= MOST_PARTS:
+                too_much = f"a name of more than {MOST_PARTS} parts"
+            elif nested > MOST_NESTED:
+                too_much = f"nested more than {MOST_NESTED} deep"
+        elif match.lastgroup == "newline":
+            parts = 0
+        if count >= MOST_TOKENS:
+            too_much = f"more than {MOST_TOKENS} numbers, names and marks; long arrays may be data URIs"
+        if too_much is not None:
+            return text.count("\n", 0, begin) + 1, too_much
+    return None
 
 
 def line_of(lines: Mapping[Place, int], place: Place) -> int:

@@ -1,8 +1,9 @@
-"""Wavefront OBJ files with their materials (MTL): positions, texture coordinates, polygons, colours and textures.
+"""Wavefront OBJ files: positions, texture coordinates, polygons, colours and textures (of materials: `mesh_mtl`).
 
 Lines are sorted by kind first and their numbers parsed in one go: a million triangles take seconds, not minutes.
-Polygons are cut as fans about their first corner. Of a material its diffuse colour Kd is read, as linear light, and its
-texture map_Kd; where there is a texture Kd multiplies it. Colours after a vertex' coordinates (x y z r g b) are linear.
+Where a material has a texture its colour multiplies it. Colours after a vertex' coordinates (x y z r g b) are linear.
+Comments behind numbers are not in the format, but in files: they are cut off where a file cannot be read with them, so
+that the others are no slower. Only where numbers cannot be read are lines looked at one by one, to name the first.
 Free-form curves, lines and points are left out. Source: Wavefront, Object Files (.obj), version 3.0.
 """
 
@@ -16,26 +17,20 @@ from typing import NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from aliasbench.scenes.errors import InputError, shortened, unknown_name
-from aliasbench.scenes.limits import RADIANCE
-from aliasbench.scenes.local_files import path_beside, read_local
-from aliasbench.scenes.mesh_parts import Part, check_amount
-from aliasbench.scenes.mesh_ply import parse_numbers
-from aliasbench.scenes.model import FloatArray, ImageTexture, Vec3
+from aliasbench.scenes.errors import InputError, printable, reason_of, shortened, unknown_name
+from aliasbench.scenes.limits import LENGTH
+from aliasbench.scenes.local_files import is_local, path_beside
+from aliasbench.scenes.mesh_mtl import Material, decoded, read_materials
+from aliasbench.scenes.mesh_parts import Part, check_amount, parse_numbers
+from aliasbench.scenes.mesh_polygons import cut_faces
+from aliasbench.scenes.model import FloatArray, ImageTexture
 from aliasbench.scenes.textures import load_image
 
 _LONGEST_CORNER = 48  # characters: three whole numbers and two slashes are fewer
 _CORNER = re.compile(rb"-?\d{1,9}(/-?\d{1,9}|(/-?\d{1,9}|/)/-?\d{1,9})?")
-_MOST_LIBRARIES = 64
+_COMMENTED = re.compile(rb"\s*(v|vt|f)\s[^#]*#")
 _FREE_TEXELS = 2**25
 _TEXELS_PER_BYTE = 16
-
-
-@dataclass(frozen=True, slots=True)
-class _Material:
-    color: Vec3 = (1.0, 1.0, 1.0)
-    image: str | None = None
-    place: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,20 +42,52 @@ class _Faces:
     before: "array[int]" = field(default_factory=lambda: array("q"))  # line, positions, texture coordinates of each
 
 
-def read_obj(data: bytes, path: Path, label: str) -> tuple[list[Part], dict[str, ImageTexture]]:
+def read_obj(
+    data: bytes, path: Path, label: str, *, retextured: bool = False
+) -> tuple[list[Part], dict[str, ImageTexture]]:
     """Return the parts of an OBJ file's content, one for each material, and the textures that they use.
+
+    Where they are to be `retextured` no texture is read.
 
     Raises
     ------
     InputError
         If a line cannot be read, an index has no vertex, or a material or a texture is missing or not beside the file.
     """
+    lines = _joined(data.splitlines())
+    try:
+        return _read_lines(lines, len(data), path, label, retextured)
+    except InputError:
+        bare = [line.split(b"#", 1)[0] if _COMMENTED.match(line) else line for line in lines]
+        if bare == lines:
+            raise
+    return _read_lines(bare, len(data), path, label, retextured)
+
+
+def _joined(lines: list[bytes]) -> list[bytes]:
+    """Return lines with those that a backslash continues as one at the first one's place, empty ones at the others'."""
+    if not any(line.endswith(b"\\") for line in lines):
+        return lines
+    out = [b""] * len(lines)
+    first, pieces = 0, list[bytes]()
+    for k, line in enumerate(lines):
+        first = first if pieces else k
+        pieces.append(line.removesuffix(b"\\"))
+        if pieces[-1] == line or k == len(lines) - 1:
+            out[first] = b" ".join(pieces)
+            pieces = []
+    return out
+
+
+def _read_lines(
+    lines: Sequence[bytes], size: int, path: Path, label: str, retextured: bool
+) -> tuple[list[Part], dict[str, ImageTexture]]:
     file = str(path)
     points, coordinates = list[bytes](), list[bytes]()
     groups: dict[str, _Faces] = {"": _Faces()}
     libraries = list[str]()
     current = groups[""]
-    for number, line in enumerate(data.replace(b"\\\r\n", b" ").replace(b"\\\n", b" ").splitlines(), 1):
+    for number, line in enumerate(lines, 1):
         words = line.split(None, 1)
         if len(words) < 2:
             continue
@@ -77,53 +104,76 @@ def read_obj(data: bytes, path: Path, label: str) -> tuple[list[Part], dict[str,
             current.counts.append(len(corners))
             current.before.extend((number, len(points), len(coordinates)))
         elif kind == b"usemtl":
-            current = groups.setdefault(rest.decode("utf-8", "replace").strip(), _Faces())
+            current = groups.setdefault(decoded(rest), _Faces())
         elif kind == b"mtllib":
-            libraries.append(rest.decode("utf-8", "replace").strip())
-    positions, colors = _read_points(points, file)
-    uv = _read_columns(coordinates, file, "vt", (1, 2, 3))
+            libraries.append(decoded(rest))
+    if not points:
+        raise InputError(f"{file}: has no vertices (lines 'v x y z'); an OBJ mesh needs them")
+    values = _read_columns(points, lines, file, "v", (3, 4, 6))
+    positions, colors = values[:, :3], np.maximum(values[:, 3:], 0.0) if values.shape[1] == 6 else None
+    uv = _read_columns(coordinates, lines, file, "vt", (1, 2, 3)) if coordinates else None
     if uv is not None and uv.shape[1] == 1:
         uv = np.concatenate([uv, np.zeros_like(uv)], axis=1)
     triangles = sum(len(g.corners) - 2 * len(g.counts) for g in groups.values())
     corners_all = sum(len(g.corners) for g in groups.values())
-    check_amount(file, max(len(positions), corners_all if uv is not None else 0), triangles, len(data))
-    materials = _read_materials(libraries, path)
+    vertices = max(len(positions), corners_all if uv is not None else 0)
+    drawn = sum(bool(g.counts) for g in groups.values())
+    check_amount(file, vertices, triangles, size, colored=0 if colors is None else triangles, parts=drawn)
+    materials = read_materials(libraries, path)
     textures: dict[str, ImageTexture] = {}
+    names: dict[Path, str] = {}
     parts = []
     for name, faces in groups.items():
         if not faces.counts:
             continue
         if name and libraries and name not in materials:
             raise InputError(f"{file}: usemtl: {unknown_name('material', name, materials)}")
-        material = materials.get(name, _Material())
-        texture = None if material.image is None else _texture(material, path, label, textures)
+        material = materials.get(name, Material())
+        texture = None
+        if material.image is not None and not retextured:
+            image = path_beside(path.parent, material.image, f"{material.image_place}: map_Kd", escaped=False)
+            if image not in names:
+                names[image] = _add_texture(image, material, path, label, textures)
+            texture = names[image]
         parts.append(_build_part(faces, positions, colors, None if uv is None else uv[:, :2], material, texture, file))
     return parts, textures
 
 
-def _read_points(lines: Sequence[bytes], file: str) -> tuple[FloatArray, FloatArray | None]:
-    """Return positions (n, 3), and colours (n, 3) where every vertex has one."""
-    values = _read_columns(lines, file, "v", (3, 4, 6))
-    if values is None:
-        raise InputError(f"{file}: has no vertices (lines 'v x y z'); an OBJ mesh needs them")
-    return values[:, :3], np.maximum(values[:, 3:], 0.0) if values.shape[1] == 6 else None
-
-
-def _read_columns(lines: Sequence[bytes], file: str, kind: str, widths: Sequence[int]) -> FloatArray | None:
-    """Return the numbers of lines of one kind as (n, width), None where there are no lines."""
-    if not lines:
-        return None
-    numbers = parse_numbers(b" ".join(lines), f"{file}: lines {kind!r}")
-    counts = [len(line.split()) for line in lines]
+def _read_columns(
+    own: Sequence[bytes], lines: Sequence[bytes], file: str, kind: str, widths: Sequence[int]
+) -> FloatArray:
+    """Return the numbers of a file's `lines` of one kind, of which those without the kind are `own`, as (n, width)."""
+    counts = [len(line.split()) for line in own]
     least = min(counts)
     width = max((w for w in widths if w <= least), default=0)
-    if width == 0:
-        raise InputError(f"{file}: a line {kind!r} has {least} numbers; {' or '.join(map(str, widths))} are needed")
-    if width * len(lines) != len(numbers):
-        # Some lines have more numbers than others: of all those that every line has.
-        text = b" ".join(b" ".join(line.split()[:width]) for line in lines)
-        numbers = parse_numbers(text, f"{file}: lines {kind!r}")
-    return numbers.reshape(len(lines), width)
+    try:
+        numbers = parse_numbers(b" ".join(own), f"{file}: lines {kind!r}")
+        if width > 0 and width * len(own) != len(numbers):
+            # Some lines have more numbers than others: of all those that every line has.
+            text = b" ".join(b" ".join(line.split()[:width]) for line in own)
+            numbers = parse_numbers(text, f"{file}: lines {kind!r}")
+    except InputError:
+        _refuse_line(lines, file, kind, widths)
+        raise
+    # Not (x > limit), so that a NaN is caught by the one comparison.
+    if width == 0 or not (np.abs(numbers.reshape(len(own), width)[:, :3]) <= LENGTH).all():
+        _refuse_line(lines, file, kind, widths)
+    return numbers.reshape(len(own), width)
+
+
+def _refuse_line(lines: Sequence[bytes], file: str, kind: str, widths: Sequence[int]) -> None:
+    """Raise `InputError` at the first line of a kind that has not the numbers it needs."""
+    for number, line in enumerate(lines, 1):
+        words = line.split()
+        if words[:1] != [kind.encode()]:
+            continue
+        place = f"{file}: line {number}: {shortened(ascii(decoded(line)))}"
+        if len(words) <= widths[0]:
+            needed = " or ".join(map(str, widths))
+            raise InputError(f"{place}: {kind} has {len(words) - 1} numbers; {needed} are needed")
+        numbers = parse_numbers(b" ".join(words[1:]), place)
+        if not (np.abs(numbers[:3]) <= LENGTH).all():
+            raise InputError(f"{place}: finite numbers up to {LENGTH:g} are needed")
 
 
 def _build_part(
@@ -131,16 +181,20 @@ def _build_part(
     positions: FloatArray,
     colors: FloatArray | None,
     uv: FloatArray | None,
-    material: _Material,
+    material: Material,
     texture: str | None,
     file: str,
 ) -> Part:
-    counts = np.array(faces.counts)
+    counts = np.array(faces.counts, np.int64)
     before = np.repeat(np.array(faces.before).reshape(-1, 3), counts, axis=0)
     numbers = _parse_corners(faces.corners, before[:, 0], file)
     point = _resolve(numbers[:, 0], before[:, 1], len(positions), before[:, 0], "vertex", file)
-    triangles = _cut(counts)
-    place = f"material {material.place}" if material.place else "faces"
+    if len(point) < len(positions):
+        # Of many materials each has few of the vertices.
+        used, point = np.unique(point, return_inverse=True)
+        positions, colors = positions[used], None if colors is None else colors[used]
+    triangles = cut_faces(point, counts, positions)
+    place = f"material {material.name}" if material.name else "faces"
     has_uv = numbers[:, 1] != 0
     if uv is None or not has_uv.all():
         if texture is not None:
@@ -206,59 +260,16 @@ def _resolve(
     return out
 
 
-def _cut(counts: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the (m, 3) corners of the triangles that cut faces of these counts of corners, in order, as fans."""
-    first = np.repeat(np.cumsum(counts) - counts, counts - 2)
-    step = np.arange(len(first)) - np.repeat(np.cumsum(counts - 2) - (counts - 2), counts - 2)
-    return np.stack([first, first + step + 1, first + step + 2], axis=1)
-
-
-def _read_materials(libraries: Sequence[str], path: Path) -> dict[str, _Material]:
-    out: dict[str, _Material] = {}
-    if len(libraries) > _MOST_LIBRARIES:
-        raise InputError(f"{path}: names {len(libraries)} material libraries; at most {_MOST_LIBRARIES} are allowed")
-    for name in libraries:
-        what = f"{path}: mtllib"
-        library = path_beside(path.parent, name.replace("\\", "/"), what, escaped=False)
-        data = read_local(library, f"{what}: {shortened(ascii(name))}")
-        current = ""
-        for number, line in enumerate(data.decode("utf-8", "replace").splitlines(), 1):
-            words = line.split(None, 1)
-            if len(words) < 2:
-                continue
-            key, rest = words[0], words[1].strip()
-            place = f"{library.name}: line {number}"
-            if key == "newmtl":
-                current = rest
-                out[current] = _Material(place=rest)
-            elif key == "Kd" and current in out:
-                numbers = parse_numbers(rest.encode(), f"{path}: {place}").tolist()
-                if not 1 <= len(numbers) <= 3 or not all(0.0 <= n <= RADIANCE for n in numbers):
-                    raise InputError(f"{path}: {place}: Kd must be three numbers from 0 to {RADIANCE:g}")
-                r, g, b = numbers if len(numbers) == 3 else numbers[:1] * 3
-                out[current] = _Material((r, g, b), out[current].image, current)
-            elif key == "map_Kd" and current in out:
-                out[current] = _Material(out[current].color, _image_name(rest, f"{path}: {place}"), current)
-    return out
-
-
-def _image_name(rest: str, place: str) -> str:
-    if rest.startswith("-"):
-        raise InputError(f"{place}: map_Kd has options ({shortened(ascii(rest))}); a path alone is read")
-    return rest.replace("\\", "/")
-
-
-def _texture(material: _Material, path: Path, label: str, textures: dict[str, ImageTexture]) -> str:
-    """Return the name of a material's texture among `textures`, which it is added to."""
-    image = path_beside(path.parent, material.image or "", f"{path}: map_Kd", escaped=False)
-    name = f"{label}#{image.name}"
-    if name not in textures or textures[name].source != material.image:
-        if name in textures:
-            name = f"{label}#{material.image}"
-        used = sum(t.texels.size // 4 for t in textures.values())
-        size = image.stat().st_size if image.is_file() else 0
+def _add_texture(image: Path, material: Material, path: Path, label: str, textures: dict[str, ImageTexture]) -> str:
+    """Add the texture of an image file to `textures` and return its name, in which the image's path is."""
+    name = printable(f"{label}#{image.relative_to(path.parent.resolve()).as_posix()}")
+    used = sum(t.texels.size // 4 for t in textures.values())
+    what = f"{material.image_place}: map_Kd: image {shortened(ascii(image.name))}"
+    try:
+        size = image.stat().st_size if is_local(image) else 0
         most = max(_FREE_TEXELS, _TEXELS_PER_BYTE * size) - used
-        what = f"{path}: map_Kd: image {image.name!r}"
-        texture = load_image(image, source=material.image, label=what, most_texels=max(0, most))
-        textures[name] = texture
+        source = printable(material.image or "")
+        textures[name] = load_image(image, source=source, label=what, most_texels=max(0, most))
+    except OSError as error:
+        raise InputError(f"{what}: cannot be read ({reason_of(error)})") from error
     return name

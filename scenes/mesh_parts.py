@@ -5,26 +5,33 @@ of no area are dropped without a word, what has the same colour, texture and mot
 expanded beyond what the size of the file can account for.
 
 The model has no colours at vertices. Where a file has, each triangle gets the mean of its corners' from a texture with
-one texel for each triangle; beside a texture of the file's own the mean over the whole part multiplies it.
+one texel for each triangle, which all parts of the same colours share; beside a texture, the file's own or one that
+replaces it, the mean over the whole part multiplies it.
 """
 
+import hashlib
 import math
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from aliasbench.scenes.errors import InputError
 from aliasbench.scenes.limits import COUNT, LENGTH, RADIANCE
-from aliasbench.scenes.model import FloatArray, ImageTexture, Motion, Surface, Vec3, read_only
+from aliasbench.scenes.model import FloatArray, ImageTexture, Motion, Surface, Vec3
 
 MOST_TRIANGLES = 20_000_000
+MOST_PARTS = 20_000  # each takes a fraction of a millisecond, however small it is
 _FREE_BYTES = 400_000_000  # of surfaces that any file may give
 _BYTES_PER_BYTE = 8  # and that it may give for each byte of its own
 _VERTEX_BYTES, _TRIANGLE_BYTES = 40, 12
+_COLORED_BYTES = 3 * _VERTEX_BYTES + 16  # of a triangle of several colours: corners of its own, and its texel
 
 Indices = NDArray[np.integer]
+Kind = TypeVar("Kind", bound=np.generic)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,20 +65,32 @@ class Part:
     place: str = ""
 
 
-def check_amount(file: str, vertices: int, triangles: int, size: int) -> None:
-    """Raise `InputError` if a file of `size` bytes comes to more vertices or triangles than are drawn."""
+def check_amount(file: str, vertices: int, triangles: int, size: int, *, colored: int = 0, parts: int = 1) -> None:
+    """Raise `InputError` if a file of `size` bytes comes to more vertices, triangles or parts than are drawn.
+
+    `colored` of the triangles may have colours at their corners.
+    """
+    if parts > MOST_PARTS:
+        raise InputError(
+            f"{file}: comes to {parts} parts (meshes by node, or faces by material); at most {MOST_PARTS} are allowed"
+        )
     if triangles > MOST_TRIANGLES:
         raise InputError(f"{file}: comes to {triangles} triangles; at most {MOST_TRIANGLES} are allowed")
-    needed = vertices * _VERTEX_BYTES + triangles * _TRIANGLE_BYTES
+    needed = vertices * _VERTEX_BYTES + triangles * _TRIANGLE_BYTES + colored * _COLORED_BYTES
     if needed > max(_FREE_BYTES, _BYTES_PER_BYTE * size):
         raise InputError(
-            f"{file}: {size} bytes come to {vertices} vertices and {triangles} triangles, {needed} bytes in memory; "
+            f"{file}: {size} bytes come to {vertices} vertices and {triangles} triangles"
+            f"{f', {colored} of them of several colours' if colored else ''}, {needed} bytes in memory; "
             f"at most {_FREE_BYTES}, or {_BYTES_PER_BYTE} times the file, are allowed"
         )
 
 
-def build_surfaces(parts: Sequence[Part], file: str, label: str) -> tuple[tuple[Surface, ...], dict[str, ImageTexture]]:
+def build_surfaces(
+    parts: Sequence[Part], file: str, label: str, *, retextured: bool = False
+) -> tuple[tuple[Surface, ...], dict[str, ImageTexture]]:
     """Return the surfaces of a file's parts, named ``label#0``, ``label#1`` ..., and the textures of vertex colours.
+
+    Where they are to be `retextured` all keep the coordinates of their own, and no textures are made.
 
     Raises
     ------
@@ -79,23 +98,34 @@ def build_surfaces(parts: Sequence[Part], file: str, label: str) -> tuple[tuple[
         If a coordinate is not finite or out of reach, an index has no vertex, or nothing with an area is left.
     """
     groups: dict[tuple[object, ...], list[Part]] = {}
-    palettes: dict[str, ImageTexture] = {}
+    palettes: dict[bytes, ImageTexture] = {}
     for number, part in enumerate(parts):
         sound = _without_waste(_checked(part, file))
         if len(sound.triangles) == 0:
             continue
         if sound.vertex_colors is not None:
-            sound = _colored(sound, f"{label}#colors {number}", palettes)
+            alone = retextured or sound.texture is not None or _is_even(sound.vertex_colors)
+            sound = _of_mean_color(sound) if alone else _with_palette(sound, f"{label}#colors {number}", palettes)
         key = (sound.color, sound.texture, sound.motion, sound.uv is None)
         groups.setdefault(key, []).append(sound)
     if not groups:
         raise InputError(f"{file}: has no triangle with an area; a mesh to draw is needed")
-    return tuple(_surface(group, f"{label}#{k}") for k, group in enumerate(groups.values())), palettes
+    surfaces = []
+    for k, group in enumerate(list(groups)):
+        # Each group is let go of once it is merged, so that no more than one is there twice.
+        surfaces.append(_surface(groups.pop(group), f"{label}#{k}"))
+    return tuple(surfaces), {palette.source: palette for palette in palettes.values()}
 
 
-def fan(first: int, count: int) -> list[tuple[int, int, int]]:
-    """Return the triangles of `count` corners in order from index `first`, all about the first corner."""
-    return [(first, first + k, first + k + 1) for k in range(1, count - 1)]
+def parse_numbers(text: bytes, place: str) -> FloatArray:
+    """Return the numbers of a text, separated by white space; raise `InputError` at what is none."""
+    with warnings.catch_warnings():
+        # What older versions of numpy only warn of.
+        warnings.simplefilter("error", DeprecationWarning)
+        try:
+            return np.fromstring(text, dtype=np.float64, sep=" ") if text.strip() else np.empty(0)
+        except (ValueError, DeprecationWarning) as error:
+            raise InputError(f"{place}: has something other than numbers where only numbers may be") from error
 
 
 def _checked(part: Part, file: str) -> Part:
@@ -153,29 +183,43 @@ def _without_waste(part: Part) -> Part:
     )
 
 
-def _colored(part: Part, name: str, palettes: dict[str, ImageTexture]) -> Part:
-    """Return a part whose vertex colours have become its colour, or a texture of one texel for each triangle."""
-    colors = part.vertex_colors
-    if colors is None:
+def _is_even(colors: FloatArray) -> bool:
+    return bool((np.ptp(np.maximum(colors, 0.0), axis=0) == 0.0).all())
+
+
+def _of_mean_color(part: Part) -> Part:
+    """Return a part whose colour is multiplied by the mean of its vertices' colours."""
+    if part.vertex_colors is None:
         return part
-    lowest = np.maximum(colors, 0.0)
-    if part.texture is not None or (np.ptp(lowest, axis=0) == 0.0).all():
-        r, g, b = (lowest.mean(axis=0) if part.texture is not None else lowest[0]).tolist()
-        color = (part.color[0] * r, part.color[1] * g, part.color[2] * b)
-        return replace(part, color=color, vertex_colors=None)
+    lowest = np.maximum(part.vertex_colors, 0.0)
+    r, g, b = (lowest[0] if _is_even(lowest) else lowest.mean(axis=0)).tolist()
+    return replace(part, color=(part.color[0] * r, part.color[1] * g, part.color[2] * b), vertex_colors=None)
+
+
+def _with_palette(part: Part, name: str, palettes: dict[bytes, ImageTexture]) -> Part:
+    """Return a part whose vertex colours have become a texture of one texel for each triangle.
+
+    The texture is added to `palettes`, by its content, under this name if there is none like it: a mesh that a file
+    shows a thousand times has one.
+    """
+    if part.vertex_colors is None:
+        return part
     count = len(part.triangles)
     side = math.ceil(math.sqrt(count))
     rows = math.ceil(count / side)
+    colors = np.maximum(part.vertex_colors, 0.0).astype(np.float32)
     texels = np.ones((rows * side, 4), np.float32)
-    texels[:count, :3] = lowest[part.triangles].mean(axis=1)
-    palettes[name] = ImageTexture(read_only(texels.reshape(rows, side, 4)), source=name)
+    texels[:count, :3] = sum(colors[part.triangles[:, k]] / 3 for k in range(3))
+    digest = hashlib.blake2b(texels.data).digest()
+    if digest not in palettes:
+        palettes[digest] = ImageTexture(_frozen(texels.reshape(rows, side, 4)), source=name)
     number = np.repeat(np.arange(count), 3)
     return replace(
         part,
         positions=part.positions[part.triangles.ravel()],
         triangles=np.arange(3 * count, dtype=np.int32).reshape(-1, 3),
         uv=np.stack([(number % side + 0.5) / side, (number // side + 0.5) / rows], axis=1),
-        texture=name,
+        texture=palettes[digest].source,
         vertex_colors=None,
     )
 
@@ -186,14 +230,21 @@ def _surface(parts: Sequence[Part], name: str) -> Surface:
     uvs = [p.uv for p in parts if p.uv is not None]
     alone = len(parts) == 1
     return Surface(
-        vertices=read_only(first.positions if alone else np.concatenate([p.positions for p in parts])),
-        triangles=read_only(
-            np.concatenate([p.triangles + s for p, s in zip(parts, starts, strict=True)]).astype(np.int32)
+        vertices=_frozen(first.positions if alone else np.concatenate([p.positions for p in parts])),
+        triangles=_frozen(
+            np.concatenate([p.triangles + s for p, s in zip(parts, starts, strict=True)]).astype(np.int32, copy=False)
         ),
         is_polygon=False,
         color=first.color,
-        uv=read_only(uvs[0] if alone else np.concatenate(uvs)) if uvs else None,
+        uv=_frozen(uvs[0] if alone else np.concatenate(uvs)) if uvs else None,
         texture=first.texture,
         motion=first.motion,
         name=name,
     )
+
+
+def _frozen(array: NDArray[Kind]) -> NDArray[Kind]:
+    """Return an array made here, which nobody else writes to, as one that nobody can: `read_only` would copy it."""
+    out = np.ascontiguousarray(array)
+    out.flags.writeable = False
+    return out

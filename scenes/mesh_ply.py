@@ -2,11 +2,10 @@
 
 A PLY file says in its header what each number is; elements and properties that are not needed are stepped over. Values
 come as one block where every element has the same size, which is what a million triangles need to be read in a
-second; faces of different sizes are walked one by one. Polygons are cut as fans about their first corner.
+second; faces of different sizes are walked one by one.
 Colours of integer type are sRGB, of float type linear, as images are. Source: G. Turk, The PLY Polygon File Format.
 """
 
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NoReturn
@@ -15,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aliasbench.scenes.errors import InputError, shortened
-from aliasbench.scenes.mesh_parts import Part, check_amount
+from aliasbench.scenes.mesh_parts import Part, check_amount, parse_numbers
+from aliasbench.scenes.mesh_polygons import cut_faces
 from aliasbench.scenes.model import FloatArray
 from aliasbench.scenes.textures import srgb_to_linear
 
@@ -71,14 +71,17 @@ def read_ply(data: bytes, file: str) -> list[Part]:
     """
     order, elements, start = _read_header(data, file)
     columns: dict[str, dict[str, Column]] = {}
-    body = np.frombuffer(data, np.uint8)[start:] if order else parse_numbers(data[start:], file)
+    body = np.frombuffer(data, np.uint8)[start:] if order else _numbers_of(data, start, file)
     reader = _Reader(body, order, file)
     for element in elements:
         if element.count > len(data):
             raise InputError(f"{file}: element {element.name} has a count of {element.count}; the file is smaller")
         columns[element.name] = reader.read(element)
-        if {"vertex", "face"} <= columns.keys():
+        # The numbers of a text say nothing of where a line ends: that all of them are used tells that they are right.
+        if order and {"vertex", "face"} <= columns.keys():
             break
+    if not order and reader.left:
+        raise InputError(f"{file}: has {reader.left} numbers more than the elements of its header have")
     kinds = {p.name: p.kind for e in elements if e.name == "vertex" for p in e.properties}
     vertex = {k: c for k, c in columns.get("vertex", {}).items() if isinstance(c, np.ndarray) and c.ndim == 1}
     face = columns.get("face", {})
@@ -89,10 +92,23 @@ def read_ply(data: bytes, file: str) -> list[Part]:
         raise InputError(f"{file}: has no faces with vertex_indices; a PLY mesh needs them")
     faces = [block for block in (corners if isinstance(corners, list) else [corners]) if block.ndim == 2]
     count = sum(len(block) * max(0, block.shape[1] - 2) for block in faces)
-    check_amount(file, len(vertex["x"]), count, len(data))
-    triangles = np.concatenate([np.empty((0, 3), np.int32), *(_fans(_as_indices(b)) for b in faces if b.shape[1] > 2)])
+    colors = _colors(vertex, kinds)
+    check_amount(file, len(vertex["x"]), count, len(data), colored=0 if colors is None else count)
+    positions = _stack(vertex, ("x", "y", "z"))
+    cut = [_cut(_as_indices(block, file), positions) for block in faces if block.shape[1] > 2]
+    triangles = np.concatenate([np.empty((0, 3), np.int32), *cut])
     uv = next((_stack(vertex, names) for names in _UV_NAMES if set(names) <= vertex.keys()), None)
-    return [Part(_stack(vertex, ("x", "y", "z")), triangles, uv, vertex_colors=_colors(vertex, kinds), place="mesh")]
+    return [Part(positions, triangles, uv, vertex_colors=colors, place="mesh")]
+
+
+def _numbers_of(data: bytes, start: int, file: str) -> FloatArray:
+    """Return the numbers of a text from a byte on; where something is none its line is named."""
+    try:
+        return parse_numbers(data[start:], file)
+    except InputError:
+        for number, line in enumerate(data[start:].splitlines(), len(data[:start].splitlines()) + 1):
+            parse_numbers(line, f"{file}: line {number}: {shortened(ascii(line.decode('latin-1')))}")
+        raise
 
 
 def _read_header(data: bytes, file: str) -> tuple[str, list[_Element], int]:
@@ -110,13 +126,15 @@ def _read_header(data: bytes, file: str) -> tuple[str, list[_Element], int]:
             case ["format", name, "1.0"] if name in _ORDERS:
                 order = _ORDERS[name]
             case ["element", name, count] if count.isascii() and count.isdigit() and len(count) < 11:
+                if any(element.name == name for element in elements):
+                    raise InputError(f"{file}: line {number}: there is an element {name!r} already; one is needed")
                 elements.append(_Element(name, int(count), ()))
             case ["property", "list", counted, kind, name] if elements and counted in _TYPES and kind in _TYPES:
                 if _TYPES[counted][0] == "f":
                     raise InputError(f"{file}: line {number}: a list is counted by {counted}; an integer is needed")
-                elements[-1] = _with(elements[-1], _Property(name, _TYPES[kind], _TYPES[counted]))
+                elements[-1] = _with(elements[-1], _Property(name, _TYPES[kind], _TYPES[counted]), file, number)
             case ["property", kind, name] if elements and kind in _TYPES:
-                elements[-1] = _with(elements[-1], _Property(name, _TYPES[kind], ""))
+                elements[-1] = _with(elements[-1], _Property(name, _TYPES[kind], ""), file, number)
             case _:
                 raise InputError(f"{file}: line {number}: {shortened(ascii(line))} is no line of a PLY 1.0 header")
     if order is None:
@@ -124,9 +142,11 @@ def _read_header(data: bytes, file: str) -> tuple[str, list[_Element], int]:
     return order, elements, newline + 1
 
 
-def _with(element: _Element, new: _Property) -> _Element:
+def _with(element: _Element, new: _Property, file: str, line: int) -> _Element:
     if any(p.name == new.name for p in element.properties):
-        return element if new.counted_by == "" else _Element(element.name, element.count, (*element.properties, new))
+        raise InputError(
+            f"{file}: line {line}: element {element.name} has a property {new.name!r} already; one is needed"
+        )
     return _Element(element.name, element.count, (*element.properties, new))
 
 
@@ -144,6 +164,11 @@ class _Reader:
 
     def __init__(self, data: NDArray[np.uint8] | FloatArray, order: str, file: str) -> None:
         self._data, self._order, self._file, self._at = data, order, file, 0
+
+    @property
+    def left(self) -> int:
+        """How many bytes, or numbers, follow what was read."""
+        return len(self._data) - self._at
 
     def read(self, element: _Element) -> dict[str, Column]:
         """Return an element's values by property: (n,) numbers, or lists as blocks of one length each."""
@@ -203,9 +228,20 @@ class _Reader:
             return int(self._data[at])
         values = self._block(self._data[None, at : at + self._size(p.counted_by)], p, 1, p.counted_by)
         n = float(values[0]) if len(values) == 1 else -1.0
-        if not (0 <= n <= len(self._data) and n.is_integer()):
+        if len(values) == 0:
             self._cut_off(element)
+        left = len(self._data) - at - self._size(p.counted_by)
+        if not (n >= 0 and n.is_integer()):
+            raise InputError(f"{self._place(element, p)} has a length of {n:g}; a whole number from 0 is needed")
+        if n * self._size(p.kind) > left:
+            raise InputError(
+                f"{self._place(element, p)} has a length of {n:g}; the file has {left // self._size(p.kind)} more of "
+                "its values (cut off?)"
+            )
         return int(n)
+
+    def _place(self, element: _Element, p: _Property) -> str:
+        return f"{self._file}: element {element.name!r}: a list {p.name!r}"
 
     def _size(self, kind: str) -> int:
         """Return how many units a value of a kind takes; no kind takes none."""
@@ -227,29 +263,20 @@ class _Reader:
         )
 
 
-def parse_numbers(text: bytes, place: str) -> FloatArray:
-    """Return the numbers of a text, separated by white space; raise `InputError` at what is none."""
-    with warnings.catch_warnings():
-        # What older versions of numpy only warn of.
-        warnings.simplefilter("error", DeprecationWarning)
-        try:
-            return np.fromstring(text, dtype=np.float64, sep=" ") if text.strip() else np.empty(0)
-        except (ValueError, DeprecationWarning) as error:
-            raise InputError(f"{place}: has something other than numbers where only numbers may be") from error
+def _cut(faces: NDArray[np.int32], positions: FloatArray) -> NDArray[np.int32]:
+    """Return the triangles (m, 3) of faces (n, k) of one number of corners."""
+    count, each = faces.shape
+    corners = faces.ravel()
+    return faces if each == 3 else corners[cut_faces(corners, np.full(count, each, np.int64), positions)]
 
 
-def _fans(faces: NDArray[np.int32]) -> NDArray[np.int32]:
-    count, corners = faces.shape
-    middle = np.stack([faces[:, 1:-1], faces[:, 2:]], axis=2)
-    first = np.broadcast_to(faces[:, None, :1], (count, corners - 2, 1))
-    return np.concatenate([first, middle], axis=2).reshape(-1, 3)
-
-
-def _as_indices(values: NDArray[np.generic]) -> NDArray[np.int32]:
+def _as_indices(values: NDArray[np.generic], file: str) -> NDArray[np.int32]:
     with np.errstate(invalid="ignore"):
         numbers = values.astype(np.float64)
     whole = (numbers >= 0) & (numbers < 2**31) & (numbers == np.floor(numbers))
-    return np.where(whole, numbers, -1.0).astype(np.int32)
+    if not whole.all():
+        raise InputError(f"{file}: a face has the index {numbers[~whole][0]:g}; whole numbers from 0 are needed")
+    return numbers.astype(np.int32)
 
 
 def _stack(columns: Mapping[str, NDArray[np.generic]], names: Sequence[str]) -> FloatArray:

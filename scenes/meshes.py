@@ -8,13 +8,14 @@ format is said in `gltf`, `mesh_obj` and `mesh_ply`; all end in `mesh_parts`. In
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 
 from aliasbench.scenes.errors import InputError, unknown_name
 from aliasbench.scenes.framing import frame_surfaces
 from aliasbench.scenes.gltf import read_gltf
 from aliasbench.scenes.gltf_document import read_document
-from aliasbench.scenes.limits import MAX_NAME, MIN_LENGTH, camera_fault, reach_fault
-from aliasbench.scenes.local_files import read_local
+from aliasbench.scenes.limits import MIN_LENGTH, camera_fault, name_of_stem, reach_fault
+from aliasbench.scenes.local_files import read_head, read_local
 from aliasbench.scenes.mesh_obj import read_obj
 from aliasbench.scenes.mesh_parts import Part, build_surfaces
 from aliasbench.scenes.mesh_ply import read_ply
@@ -23,6 +24,7 @@ from aliasbench.scenes.projection import view_at
 
 MODEL_SUFFIXES = (".glb", ".gltf", ".obj", ".ply")
 FPS = 30
+_HEAD = 4096  # bytes, in which what is no text shows
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,7 +36,7 @@ class MeshFile:
     surfaces : tuple of Surface
         One for each colour, texture and motion, named ``label#0``, ``label#1`` and so on.
     textures : mapping of str to ImageTexture
-        By the names that the surfaces use; each begins with the label and a ``#``.
+        By the names that the surfaces use; each begins with the label and a ``#``. Not to be written to.
     camera : Camera or None
         The file's first.
     animation : Animation or None
@@ -47,7 +49,7 @@ class MeshFile:
     animation: Animation | None = None
 
 
-def load_mesh(path: Path, *, label: str | None = None) -> MeshFile:
+def load_mesh(path: Path, *, label: str | None = None, retextured: bool = False) -> MeshFile:
     """Return a model file's surfaces in its own coordinates, y up, with their textures.
 
     Parameters
@@ -57,6 +59,9 @@ def load_mesh(path: Path, *, label: str | None = None) -> MeshFile:
     label : str, optional
         What names of surfaces and textures begin with: the file's name where it is not given. Give the path as a scene
         file writes it, so that two files of one name are told apart.
+    retextured : bool
+        Another texture is put on all surfaces: those of the file are not read, and none is made of vertex colours, of
+        which the mean is left. Texture coordinates are the file's own, None where a part has none.
 
     Raises
     ------
@@ -71,20 +76,24 @@ def load_mesh(path: Path, *, label: str | None = None) -> MeshFile:
     parts: list[Part]
     camera, duration = None, 0.0
     if suffix in (".glb", ".gltf"):
-        model = read_gltf(read_document(path), label)
+        model = read_gltf(read_document(path), label, retextured=retextured)
         parts, textures, camera, duration = list(model.parts), model.textures, model.camera, model.duration_s
     elif suffix == ".obj":
-        parts, textures = read_obj(read_local(path, file), path, label)
+        if b"\0" in read_head(path, file, _HEAD):
+            raise InputError(f"{file}: is no OBJ text (it has bytes of 0); an OBJ file is lines such as 'v x y z'")
+        parts, textures = read_obj(read_local(path, file), path, label, retextured=retextured)
     else:
+        if read_head(path, file, 3) != b"ply":
+            raise InputError(f"{file}: has no PLY header ('ply' to 'end_header'); it is damaged, or no PLY file")
         parts = read_ply(read_local(path, file), file)
-    surfaces, palettes = build_surfaces(parts, file, label)
+    surfaces, palettes = build_surfaces(parts, file, label, retextured=retextured)
     moving = any(not s.motion.is_static for s in surfaces) or (camera is not None and not camera.is_static)
     animation = None
     if moving:
         frames = max(1, round(duration * FPS))
         # So many frames a second that the animation is a whole number of them, and loops where its motion does.
         animation = Animation(fps=frames / duration, frames=frames)
-    return MeshFile(surfaces, {**textures, **palettes}, camera, animation)
+    return MeshFile(surfaces, MappingProxyType({**textures, **palettes}), camera, animation)
 
 
 def load_model_scene(path: Path) -> Scene:
@@ -110,7 +119,7 @@ def load_model_scene(path: Path) -> Scene:
         if fault is not None:
             raise InputError(f"{path}: its {'coordinates' if fault[0] == 'shape' else fault[0]} must be {fault[1]}")
     return Scene(
-        name="".join(c if c.isprintable() else "?" for c in path.stem)[:MAX_NAME],
+        name=name_of_stem(path.stem),
         camera=camera,
         objects=model.surfaces,
         textures=model.textures,

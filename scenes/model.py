@@ -1,61 +1,23 @@
 """The scene as plain data: what both renderers, the references and the metrics are given.
 
 Everything is immutable, in float64, right-handed with y up, in world units, seconds and linear radiance. Small vectors
-are tuples; arrays (vertices, texels) are read-only. Two scenes are equal when their content is: `content_digest` hashes
+are tuples; arrays (vertices, texels) are read-only. Two scenes are equal when their content is: `digest` hashes
 every value, and is also the key under which references are cached.
 """
 
-import hashlib
-import struct
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, is_dataclass
+from dataclasses import dataclass, field
 from typing import Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from aliasbench.scenes.digest import content_digest as content_digest  # equality is part of the model
+
 Vec2 = tuple[float, float]
 Vec3 = tuple[float, float, float]
 MaterialKind = Literal["unlit", "diffuse", "glossy", "glass"]
 FloatArray = NDArray[np.float64]
-
-
-def content_digest(value: object) -> str:
-    """Return the SHA-256 (hex) of a value made of dataclasses, containers, arrays, numbers, text and None."""
-    digest = hashlib.sha256()
-    _feed(digest, value)
-    return digest.hexdigest()
-
-
-def _feed(digest: "hashlib._Hash", value: object) -> None:
-    if isinstance(value, np.ndarray):
-        data = np.ascontiguousarray(value)
-        digest.update(f"array{data.dtype.str}{data.shape}".encode())
-        digest.update(data.tobytes())
-    elif is_dataclass(value) and not isinstance(value, type):
-        digest.update(type(value).__name__.encode())
-        for f in fields(value):
-            digest.update(f.name.encode())
-            _feed(digest, getattr(value, f.name))
-    elif isinstance(value, Mapping):
-        digest.update(f"map{len(value)}".encode())
-        for key in sorted(value):
-            _feed(digest, key)
-            _feed(digest, value[key])
-    elif isinstance(value, (tuple, list)):
-        digest.update(f"seq{len(value)}".encode())
-        for item in value:
-            _feed(digest, item)
-    elif isinstance(value, bool) or value is None:
-        digest.update(repr(value).encode())
-    elif isinstance(value, (int, float, np.floating, np.integer)):
-        digest.update(b"n" + struct.pack("<d", float(value)))
-    elif isinstance(value, str):
-        digest.update(f"s{len(value)}:{value}".encode())
-    else:
-        raise TypeError(f"no digest for {type(value).__name__}")
-
-
 Scalar = TypeVar("Scalar", bound=np.generic)
 
 
@@ -66,6 +28,12 @@ def read_only(array: NDArray[Scalar]) -> NDArray[Scalar]:
         out = out.copy()
         out.flags.writeable = False
     return out
+
+
+def as_vec3(values: FloatArray) -> Vec3:
+    """Return three numbers as a plain vector; -0.0, which calculations leave behind, becomes 0.0."""
+    x, y, z = (values + 0.0).tolist()
+    return (x, y, z)
 
 
 @dataclass(frozen=True, slots=True)
@@ -229,6 +197,13 @@ class ZonePlate:
 
 
 Texture = Checker | ImageTexture | Grating | ZonePlate
+# What scene files and people call them.
+TEXTURE_KINDS: Mapping[type[Texture], str] = {
+    Checker: "checker",
+    ImageTexture: "image",
+    Grating: "grating",
+    ZonePlate: "zone_plate",
+}
 
 
 @dataclass(frozen=True, slots=True)

@@ -49,7 +49,7 @@ PHOTOGRAPHS: Mapping[str, str] = MappingProxyType(
 
 
 def load_photograph(name: str, alpha_cutoff: float | None = None) -> ImageTexture:
-    """Return a photograph of scikit-image as a texture; the same object whenever the same is asked for again.
+    """Return a photograph of scikit-image as a texture. Its file is read once, and all share its texels.
 
     Parameters
     ----------
@@ -67,15 +67,12 @@ def load_photograph(name: str, alpha_cutoff: float | None = None) -> ImageTextur
     files = {file: key for key, file in PHOTOGRAPHS.items()}
     if word not in PHOTOGRAPHS and word not in files:
         raise unknown_name("photograph", name, PHOTOGRAPHS)
-    return _load(PHOTOGRAPHS.get(word, word), alpha_cutoff)
+    whole = _load(PHOTOGRAPHS.get(word, word))
+    return whole if alpha_cutoff is None else ImageTexture(whole.texels, alpha_cutoff, whole.source)
 
 
-@lru_cache(maxsize=16)
-def _load(file: str, alpha_cutoff: float | None) -> ImageTexture:
-    if alpha_cutoff is not None:
-        # Another cut of the same picture shares its texels.
-        whole = _load(file, None)
-        return ImageTexture(whole.texels, alpha_cutoff, whole.source)
+@lru_cache(maxsize=len(PHOTOGRAPHS))
+def _load(file: str) -> ImageTexture:
     return load_image(_path(file), source=SOURCE_PREFIX + file)
 
 

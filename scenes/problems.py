@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NoReturn, TypeVar
 
-from aliasbench.scenes.errors import InputError
+from aliasbench.scenes.errors import InputError, one_line
 
 Place = tuple[str | int, ...]  # keys and indices from the file's root
 Part = TypeVar("Part")
@@ -39,13 +39,14 @@ class Problems:
         Keep problems instead of raising the first.
     """
 
-    __slots__ = ("_collect", "_found", "_keys", "file")
+    __slots__ = ("_collect", "_found", "_keys", "_meant", "file")
 
     def __init__(self, file: str, *, collect: bool = False) -> None:
         self.file = file
         self._collect = collect
         self._found: list[Problem] = []
         self._keys: set[Problem] = set()
+        self._meant: set[Place] = set()
 
     @property
     def found(self) -> tuple[Problem, ...]:
@@ -56,10 +57,18 @@ class Problems:
         """Raise `InputError` with the file and the text; keep the problem instead where they are collected."""
         if not self._collect:
             raise InputError(f"{self.file}: {text}")
-        problem = Problem(place, text)
+        problem = Problem(place, one_line(text))
         if problem not in self._keys:
             self._keys.add(problem)
             self._found.append(problem)
+
+    def expect(self, place: Place) -> None:
+        """Take note that an unknown key, which was reported, was probably meant to be this one."""
+        self._meant.add(place)
+
+    def is_meant(self, place: Place) -> bool:
+        """Return whether a key is missing only because it is misspelt, of which enough was said."""
+        return place in self._meant
 
     def refuse(self, place: Place, text: str) -> NoReturn:
         """Report a problem after which the part of the file that it is in cannot be read on."""

@@ -14,7 +14,7 @@ from typing import NoReturn
 
 import numpy as np
 
-from aliasbench.scenes.errors import SHOWN, shortened, unknown_name
+from aliasbench.scenes.errors import SHOWN, nearest, shortened, unknown_name
 from aliasbench.scenes.limits import LENGTH, MIN_LENGTH, RADIANCE
 from aliasbench.scenes.model import FloatArray, Vec3
 from aliasbench.scenes.problems import Place, Problems
@@ -60,7 +60,8 @@ class Table:
     def report(self, key: str, allowed: str) -> None:
         """Report a key's value (or its absence), saying what is allowed."""
         if key not in self.values:
-            self.fail(key, f"{self.where(key)} is missing; it must be {allowed}")
+            if not self.problems.is_meant((*self.place, key)):
+                self.fail(key, f"{self.where(key)} is missing; it must be {allowed}")
         else:
             self.fail(key, f"{self.where(key)} = {shown(self.values[key])}: must be {allowed}")
 
@@ -78,10 +79,14 @@ class Table:
         for key, value in self.values.items():
             if key not in known:
                 self.fail(key, f"{self.where(key)} = {shown(value)}: {unknown_name('key', key, known)}")
+                if (meant := nearest(key, known)) is not None:
+                    self.problems.expect((*self.place, meant))
 
     def check_exclusive(self, keys: Sequence[str], what: str) -> str:
         """Return which one of the keys is given; refuse none and more than one."""
         given = [key for key in keys if key in self.values]
+        if not given and any(self.problems.is_meant((*self.place, key)) for key in keys):
+            self.problems.give_up()
         if len(given) != 1:
             place = self.path or "the file"
             found = f"{' and '.join(given)} together" if given else "none of them"

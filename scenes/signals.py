@@ -92,44 +92,38 @@ def build_nyquist_sweep(
     low, high = (0.5 - contrast / 2,) * 3, (0.5 + contrast / 2,) * 3
     # the outermost bands go on outside the picture, where filters see them
     heights = [REACH, *(HEIGHT * (0.5 - row / count) for row in range(1, count)), -REACH]
-    model = _band(0.0, 1.0)
-    objects: list[Surface] = []
+    keys: list[str] = []
     textures: dict[str, Texture] = {}
     facts: list[GratingFact] = []
-    for number, rate in enumerate(sweep_rates(lowest, highest, rates)):
+    for rate in sweep_rates(lowest, highest, rates):
         cycles = count / HEIGHT / rate
         facts.append(GratingFact((cycles, 0.0)))
         for step in range(phases):
-            row = number * phases + step
             key = f"rate {rate:.12g} phase {step} of {phases}"
             textures[key] = Grating(cycles, 0.0, step / phases, "square" if profile == "square" else "sine", low, high)
-            objects.append(_stretched(model, heights[row + 1], heights[row], key))
+            keys.append(key)
     return Scene(
         name=name,
         camera=flat_camera(),
-        objects=tuple(objects),
+        objects=_bands(heights, keys),
         textures=textures,
         contrast=contrast,
         facts=Facts(gratings=tuple(facts)),
     )
 
 
-def _band(bottom: float, top: float) -> Surface:
-    corners = [
-        (-SWEEP_REACH, bottom, 0.0),
-        (SWEEP_REACH, bottom, 0.0),
-        (SWEEP_REACH, top, 0.0),
-        (-SWEEP_REACH, top, 0.0),
-    ]
-    return quad(corners, uv=[(x, y) for x, y, _ in corners])
-
-
-def _stretched(model: Surface, bottom: float, top: float, key: str) -> Surface:
-    """Return a band between two heights with the texture of that name; `model` is the band from 0 to 1."""
-    # A stretched band needs no new check, and checking hundreds of them takes longer than all else.
-    vertices = model.vertices.copy()
-    vertices[:, 1] = np.where(model.vertices[:, 1] == 0.0, bottom, top)
-    return replace(model, vertices=read_only(vertices), uv=read_only(vertices[:, :2]), texture=key, name=key)
+def _bands(heights: list[float], keys: list[str]) -> tuple[Surface, ...]:
+    """Return bands between heights, one below the other, with these textures; their uv are world units."""
+    outline = np.array([(-SWEEP_REACH, 0.0), (SWEEP_REACH, 0.0), (SWEEP_REACH, 1.0), (-SWEEP_REACH, 1.0)])
+    first = quad(np.c_[outline, np.zeros(4)], uv=outline)
+    # A stretched band needs no new check, and checking thousands of them takes longer than all else.
+    corners = np.tile(first.vertices, (len(heights) - 1, 1, 1))
+    corners[:, :2, 1], corners[:, 2:, 1] = np.array(heights)[1:, None], np.array(heights)[:-1, None]
+    vertices, uv = read_only(corners), read_only(corners[..., :2])
+    return tuple(
+        replace(first, vertices=places, uv=own, texture=key, name=key)
+        for places, own, key in zip(vertices, uv, keys, strict=True)
+    )
 
 
 ENTRIES = (

@@ -1,24 +1,39 @@
 """What a texture's value is, and the one mip chain that both renderers filter from.
 
 Values and filtering are in linear light. An image is a grid of constant squares (point) or their bilinear blend; an
-analytic texture is evaluated exactly under point and linear, and `mip_chain` bakes one period of it otherwise, together
-with the affine map from uv to the coordinates of the baked tile, so that repeats are exact.
+analytic texture is evaluated exactly under point and linear, and is an image otherwise, together with the affine map
+from uv to that image's coordinates. Of checkers and gratings it is one period, so that repeats are exact; of a zone
+plate, which has none, all that a scene's surfaces show (`scene_chain`). Its texels are means over their areas and not
+samples, or the levels would be averages of aliases.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from aliasbench.scenes.errors import InputError
+from aliasbench.scenes.errors import InputError, printable
 from aliasbench.scenes.limits import RADIANCE
-from aliasbench.scenes.model import Checker, FloatArray, Grating, ImageTexture, Texture, read_only
+from aliasbench.scenes.model import (
+    Checker,
+    FloatArray,
+    Grating,
+    ImageTexture,
+    Scene,
+    Texture,
+    Vec2,
+    ZonePlate,
+    read_only,
+)
+from aliasbench.scenes.plate_levels import plate_levels
 from aliasbench.scenes.stderr import silenced_stderr
 
 TexelArray = NDArray[np.float32]
-BAKED_SIZE = 64  # texels across a baked period: a checker is exact at any even size
-ZONE_PLATE_SIZE = 1024  # texels across uv 0..1
+# Texels across a baked period: a checker's squares end between texels at any even size, a square wave's bars at any
+# multiple of four.
+BAKED_SIZE = 64
 MOST_TEXELS = 2**26  # 8192 x 8192, a gigabyte of them: a few kilobytes of a file can claim any number
 _BAND = 2**16  # texels converted at a time
 
@@ -77,16 +92,16 @@ def load_image(
         options.attribute("oiio:UnassociatedAlpha", 1)
         image = oiio.ImageInput.open(str(path), options)
         if image is None:
-            raise InputError(f"{what}: cannot be read ({_first_line(oiio.geterror())})")
+            raise InputError(f"{what}: cannot be read ({_first_line(oiio.geterror)})")
         try:
             spec = image.spec()
             kind = spec.format.basetype
             if spec.width * spec.height > most_texels:
                 raise InputError(f"{what}: has {spec.width} x {spec.height} texels; at most {most_texels} are allowed")
-            wanted = oiio.UINT8 if kind == oiio.UINT8 else oiio.FLOAT
+            wanted = kind if kind in (oiio.UINT8, oiio.UINT16) else oiio.FLOAT
             pixels = image.read_image(0, 0, 0, min(spec.nchannels, 4), wanted)
             if pixels is None or pixels.size == 0:
-                raise InputError(f"{what}: cannot be read ({_first_line(image.geterror())})")
+                raise InputError(f"{what}: cannot be read ({_first_line(image.geterror)})")
         finally:
             image.close()
     is_float = kind in (oiio.HALF, oiio.FLOAT, oiio.DOUBLE)
@@ -100,33 +115,39 @@ def load_image(
 
 
 def _linear_texels(pixels: NDArray[np.generic], is_float: bool) -> TexelArray:
-    """Return (h, w, 4) linear texels, bottom row first, of an image's (h, w, 1 to 4) values: bytes or float32.
+    """Return (h, w, 4) linear texels, bottom row first, of an image's (h, w, 1 to 4) values: 8 or 16 bits, or float32.
 
-    Bytes are looked up, everything else is converted some rows at a time: a large texture costs its texels and little
-    more.
+    Whole numbers are looked up, everything else is converted some rows at a time: a large texture costs its texels and
+    little more.
     """
     height, width, channels = pixels.shape
     color = slice(0, 1 if channels < 3 else 3)
     out = np.ones((height, width, 4), np.float32)
-    steps = np.arange(256) / 255
+    is_looked_up = pixels.dtype.kind == "u"
+    most = 2 ** (8 * pixels.dtype.itemsize) - 1 if is_looked_up else 1
+    steps = np.arange(most + 1) / most
     light, share = srgb_to_linear(steps).astype(np.float32), steps.astype(np.float32)
     band = max(1, _BAND // width)
     for top in range(0, height, band):
         rows = pixels[::-1][top : top + band]
         part = out[top : top + band]
-        if pixels.dtype == np.uint8:
+        if is_looked_up:
             part[..., :3] = light[rows[..., color]]
         else:
             part[..., :3] = rows[..., color] if is_float else srgb_to_linear(rows[..., color].astype(np.float64))
         if channels in (2, 4):
-            part[..., 3] = share[rows[..., -1]] if pixels.dtype == np.uint8 else rows[..., -1]
+            part[..., 3] = share[rows[..., -1]] if is_looked_up else rows[..., -1]
     return out
 
 
-def _first_line(errors: str) -> str:
+def _first_line(errors: Callable[[], str]) -> str:
     """Return the first of an image library's errors: what follows says the same less plainly."""
-    lines = [line.strip() for line in errors.splitlines() if line.strip()]
-    return lines[0] if lines else "no image of a known format"
+    try:
+        lines = [line.strip() for line in errors().splitlines() if line.strip()]
+    except UnicodeDecodeError:
+        # It quotes the file's own bytes.
+        return "damaged, or no image of a known format"
+    return printable(lines[0]) if lines else "no image of a known format"
 
 
 def evaluate_point(texture: Texture, uv: FloatArray) -> FloatArray:
@@ -159,7 +180,7 @@ class MipChain:
     Attributes
     ----------
     levels : tuple of (h, w, 4) float32
-        Row 0 at v = 0; level 0 is the texture itself.
+        Row 0 at the least v; level 0 is the image itself.
     uv_matrix : (2, 3) float64
         Takes (u, v, 1) to the coordinates in which the chain repeats with period 1.
     """
@@ -168,8 +189,28 @@ class MipChain:
     uv_matrix: FloatArray
 
 
-def mip_chain(texture: Texture) -> MipChain:
-    """Return the mip chain of a texture; of an analytic one, of one period sampled at texel centres."""
+def scene_chain(scene: Scene, name: str) -> MipChain:
+    """Return the mip chain of a scene's texture, of a zone plate as far as the scene's surfaces show it."""
+    shown = [surface.uv for surface in scene.objects if surface.texture == name and surface.uv is not None]
+    uv = np.concatenate([np.zeros((0, 2)), *shown])
+    if not len(uv):
+        return mip_chain(scene.textures[name])
+    (left, bottom), (right, top) = uv.min(axis=0).tolist(), uv.max(axis=0).tolist()
+    plates = sum(isinstance(texture, ZonePlate) for texture in scene.textures.values())
+    return mip_chain(scene.textures[name], (left, bottom), (right, top), max(plates, 1))
+
+
+def mip_chain(texture: Texture, low: Vec2 = (0.0, 0.0), high: Vec2 = (1.0, 1.0), plates: int = 1) -> MipChain:
+    """Return the mip chain of a texture: every texel is the texture's mean over the texel's area.
+
+    Parameters
+    ----------
+    texture : Texture
+    low, high : Vec2
+        Range of uv that is looked at, for zone plates: beyond it they are wrong. The others repeat.
+    plates : int
+        How many zone plates share what memory they may take.
+    """
     matrix = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
     if isinstance(texture, ImageTexture):
         base = texture.texels.astype(np.float64)
@@ -182,8 +223,11 @@ def mip_chain(texture: Texture) -> MipChain:
         row = np.array([np.cos(angle), np.sin(angle), 0.0]) * texture.cycles
         matrix = np.array([[row[0], row[1], texture.phase], [0.0, 0.0, 0.5]])
         base = _bake(Grating(1.0, 0.0, 0.0, texture.profile, texture.low, texture.high), 4 * BAKED_SIZE, 1)
+        if texture.profile == "sine":
+            mean = base.mean(axis=1, keepdims=True)
+            base = mean + (base - mean) * np.sinc(1 / (4 * BAKED_SIZE))
     else:
-        base = _bake(texture, ZONE_PLATE_SIZE, ZONE_PLATE_SIZE)
+        return MipChain(*plate_levels(texture, low, high, plates))
     levels = [read_only(base.astype(np.float32))]
     while levels[-1].shape[0] > 1 or levels[-1].shape[1] > 1:
         levels.append(read_only(_halve(levels[-1]).astype(np.float32)))
@@ -191,6 +235,7 @@ def mip_chain(texture: Texture) -> MipChain:
 
 
 def _bake(texture: Texture, width: int, height: int) -> FloatArray:
+    """Return a texture's values at the centres of the texels of uv 0..1, (height, width, 4)."""
     u, v = np.meshgrid((np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height)
     return evaluate_point(texture, np.stack([u, v], axis=-1))
 

@@ -2,7 +2,7 @@
 
 import json
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 
@@ -46,3 +46,11 @@ def header(*keys: str) -> str:
 def safe_file_name(text: str) -> str:
     """Return a text as part of a file's name that any file system takes."""
     return re.sub(r"[^A-Za-z0-9._=+-]+", "-", text)[:80].strip("-.") or "scene"
+
+
+def free_file_name(stem: str, suffix: str, taken: Collection[str]) -> str:
+    """Return a file's name that is not taken, numbered where it must be; to some file systems upper case is lower."""
+    name, number = f"{stem}{suffix}", 2
+    while name.lower() in {other.lower() for other in taken}:
+        name, number = f"{stem}-{number}{suffix}", number + 1
+    return name

@@ -5,9 +5,10 @@ k r / pi cycles to a picture height. Where that is once, twice, ... the number o
 about a centre that is not there. At the default k false centres lie 0.2 picture heights apart, in rows and columns, in
 a picture 256 high, and 0.4 apart at 512. Look at them; what is true there is an even grey.
 
-The texture is analytic, evaluated exactly where it is sampled. Filtered minification works on a picture of one picture
-height, 1024 texels wide, that repeats: beyond a square picture's borders it is another zone plate. Nothing is declared:
-the frequency is another one everywhere. A pan moves the rings to the right; they never repeat, so it does not loop.
+The texture is analytic, evaluated exactly where it is sampled. Filtered minification works on an image of all that the
+plate covers, of exact area averages, 1024 texels to a picture height (512 where it pans); in pictures that are higher,
+filtered rings are blurred by its texels. Nothing is declared: the frequency is another one everywhere. A pan moves the
+rings to the right; they never repeat, so it does not loop.
 """
 
 import math

@@ -74,7 +74,7 @@ TECHNIQUES = (
 LOOPS = ("brick-floor", "checker-floor", "slivers", "window-screens")
 
 
-def features(scene: Scene, renderer: str) -> set[str]:
+def features(scene: Scene) -> set[str]:
     """What the scene has that a renderer may refuse, in the words of the refusals."""
     kinds = {s.material.kind for s in scene.objects} - {"unlit", "diffuse"}
     out = {f"material {kind}" for kind in kinds}
@@ -82,12 +82,6 @@ def features(scene: Scene, renderer: str) -> set[str]:
         out |= {"lights"}
     if scene.camera.lens_radius > 0.0:
         out |= {"a lens"}
-    used = {s.texture for s in scene.objects} - {None}
-    cut = [
-        t for k, t in scene.textures.items() if k in used and isinstance(t, ImageTexture) and t.alpha_cutoff is not None
-    ]
-    if cut and renderer == "raytrace":
-        out |= {"alpha_cutoff"}
     return out
 
 
@@ -201,7 +195,7 @@ def test_what_the_renderers_draw_agrees_with_the_reference(text: str) -> None:
         pictures = draw(scene, technique, frame)
         if isinstance(pictures, UnsupportedScene):
             assert str(pictures).startswith(f"{renderer}: ")
-            assert any(feature in str(pictures) for feature in features(scene, renderer)), pictures
+            assert any(feature in str(pictures) for feature in features(scene)), pictures
             continue
         truth = render(scene, "reference:", size=SIZE, frame=frame) if truth is None else truth
         assert np.ptp(truth.pixels) > 1e-3

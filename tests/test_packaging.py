@@ -22,13 +22,13 @@ def modules() -> Iterator[Path]:
 
 
 def test_the_package_list_names_every_folder_with_modules() -> None:
-    listed = set(tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]["packages"])
+    listed = set(tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["setuptools"]["packages"])
     found = {"aliasbench." + ".".join(p.parent.relative_to(ROOT).parts) for p in modules()}
     assert listed == found
 
 
 def imported(path: Path) -> Iterator[str]:
-    for node in ast.walk(ast.parse(path.read_text())):
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.ImportFrom) and node.module:
             yield node.module
         elif isinstance(node, ast.Import):
@@ -49,7 +49,7 @@ def test_imports_run_one_way(path: Path) -> None:
 
 @pytest.mark.parametrize("path", list(modules()), ids=lambda p: p.relative_to(ROOT).as_posix())
 def test_a_module_says_why_it_exists_and_only_the_command_line_prints_or_exits(path: Path) -> None:
-    tree = ast.parse(path.read_text())
+    tree = ast.parse(path.read_text(encoding="utf-8"))
     assert ast.get_docstring(tree), f"{path.name} opens without saying why it exists"
     if path.relative_to(ROOT).as_posix() == "bench/cli.py":
         return

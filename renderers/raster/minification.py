@@ -1,6 +1,6 @@
 """Textures on the graphics side: the shared mip chain, uploaded level by level, and the shader variant for each mode.
 
-Levels come from `textures.mip_chain` and not from the driver, so both renderers minify the same numbers; they are
+Levels come from `textures.scene_chain` and not from the driver, so both renderers minify the same numbers; they are
 stored as 32-bit floats because drivers filter an 8-bit texture to 8 bits. Analytic textures are evaluated by the shader
 under point and linear, and are images otherwise.
 """
@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from aliasbench.renderers.technique import Technique
 from aliasbench.scenes.errors import InputError
-from aliasbench.scenes.model import Checker, FloatArray, Grating, ImageTexture, Texture, ZonePlate
-from aliasbench.scenes.textures import mip_chain
+from aliasbench.scenes.model import Checker, FloatArray, Grating, ImageTexture, Scene, ZonePlate
+from aliasbench.scenes.textures import scene_chain
 
 Uniform = float | tuple[float, ...]
 
@@ -60,8 +60,8 @@ def chosen_lod_bias(technique: Technique) -> float:
     return float(technique.lod_bias)
 
 
-def make_shading(gl: moderngl.Context, texture: Texture | None, technique: Technique, max_size: int) -> Shading:
-    """Return the shading for a texture (None: colour alone), its image uploaded.
+def make_shading(gl: moderngl.Context, scene: Scene, name: str | None, technique: Technique, max_size: int) -> Shading:
+    """Return the shading for a scene's texture (None: colour alone), its image uploaded.
 
     Raises
     ------
@@ -69,12 +69,13 @@ def make_shading(gl: moderngl.Context, texture: Texture | None, technique: Techn
         If the image is larger than `max_size`, the device's limit.
     """
     identity = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
-    if texture is None:
+    if name is None:
         return Shading("PLAIN", "POINT", identity, True)
+    texture = scene.textures[name]
     exact = technique.texture in ("point", "linear")
     if exact and not isinstance(texture, ImageTexture):
         return _make_analytic(texture)
-    chain = mip_chain(texture)
+    chain = scene_chain(scene, name)
     levels = chain.levels[:1] if exact else chain.levels
     height, width = levels[0].shape[:2]
     if max(width, height) > max_size:
@@ -84,7 +85,7 @@ def make_shading(gl: moderngl.Context, texture: Texture | None, technique: Techn
         # only allocates the levels
         image.build_mipmaps(0, len(levels) - 1)
     for number, level in enumerate(levels):
-        image.write(level.tobytes(), level=number)
+        image.write(level, level=number)
     image.filter = _FILTERS[technique.texture]
     image.repeat_x = image.repeat_y = True
     cutoff = texture.alpha_cutoff if isinstance(texture, ImageTexture) else None

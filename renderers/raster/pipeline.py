@@ -57,7 +57,7 @@ class SceneBuffers:
         self._context = context
         texture_names = [s.texture for s in scene.objects]
         shadings = {
-            name: make_shading(gl, None if name is None else scene.textures[name], technique, context.max_texture_size)
+            name: make_shading(gl, scene, name, technique, context.max_texture_size)
             for name in dict.fromkeys(texture_names)
         }
         vertices, triangles, surfaces = _gather(scene, bodies, [shadings[n] for n in texture_names])

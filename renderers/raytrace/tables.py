@@ -58,7 +58,7 @@ from aliasbench.renderers.raytrace.texturing import (
 )
 from aliasbench.scenes.model import Checker, FloatArray, Grating, ImageTexture, Scene, Texture
 from aliasbench.scenes.motion import object_matrix
-from aliasbench.scenes.textures import MipChain, mip_chain
+from aliasbench.scenes.textures import MipChain, scene_chain
 
 _CHAIN_KIND = {"point": NEAREST, "linear": TRILINEAR, "mipmap": MIPMAP, "trilinear": TRILINEAR}
 
@@ -172,7 +172,7 @@ def build_looks(scene: Scene, mode: str) -> Looks:
             _put_analytic(values, texture)
             continue
         if surface.texture not in placed:
-            chain = mip_chain(texture)
+            chain = scene_chain(scene, surface.texture)
             placed[surface.texture] = len(levels), chain
             for level in chain.levels:
                 levels.append((size, level.shape[1], level.shape[0]))

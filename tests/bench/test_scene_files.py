@@ -1,17 +1,25 @@
 """`aliasbench scenes export` and `check`: what they print and write, and what they refuse."""
 
 import json
+import os
+import stat
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from aliasbench.bench import whole_files
+from aliasbench.bench.frames import write_image
+from aliasbench.bench.scene_files import export_files
+from aliasbench.scenes import checking
 from aliasbench.scenes.catalog import SCENES
 from aliasbench.scenes.errors import InputError, UnsupportedScene
 from aliasbench.scenes.files import load_scene
+from aliasbench.scenes.model import Scene
+from aliasbench.scenes.schema import Table
 
 Run = Callable[..., tuple[int, str, str]]
 PROGRAM = [sys.executable, "-m", "aliasbench.bench"]
@@ -96,7 +104,80 @@ def test_a_disk_that_fills_up_leaves_what_was_there(tmp_path: Path, monkeypatch:
     monkeypatch.setattr(whole_files.os, "fsync", full)
     with pytest.raises(InputError, match=r"cannot write into .*: No space left on device"):
         whole_files.write_files(tmp_path, {"a": b"new", "b": b"new"})
-    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"a": "old"}
+    assert {path.name: path.read_text(encoding="utf-8") for path in tmp_path.iterdir()} == {"a": "old"}
+
+
+@pytest.mark.parametrize("links", [True, False])
+def test_a_file_that_cannot_be_renamed_leaves_what_was_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, *, links: bool
+) -> None:
+    for name in "ac":
+        (tmp_path / name).write_text(f"old {name}", encoding="utf-8")
+    replace = Path.replace
+
+    def refuse(self: Path, target: Path) -> Path:
+        if target.name == "c" and not self.name.endswith("-old"):
+            raise PermissionError(1, "Operation not permitted")
+        return replace(self, target)
+
+    def no_link(*_: object, **__: object) -> None:
+        raise OSError(95, "Operation not supported")
+
+    if not links:
+        monkeypatch.setattr(whole_files.os, "link", no_link)
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "replace", refuse)
+        with pytest.raises(InputError, match=r"cannot write into .*: Operation not permitted"):
+            whole_files.write_files(tmp_path, dict.fromkeys("abc", b"new"))
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == {"a": b"old a", "c": b"old c"}
+    assert whole_files.write_files(tmp_path, dict.fromkeys("abc", b"new")) == [tmp_path / name for name in "abc"]
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == dict.fromkeys("abc", b"new")
+
+
+def test_what_was_there_is_never_thrown_away_even_when_it_cannot_be_put_back(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "a").write_bytes(b"old")
+    replace, renamed = Path.replace, []
+
+    def once(self: Path, target: Path) -> Path:
+        renamed.append(target)
+        if len(renamed) > 1:
+            raise OSError(5, "Input/output error")
+        return replace(self, target)
+
+    monkeypatch.setattr(Path, "replace", once)
+    with pytest.raises(InputError, match="Input/output error"):
+        whole_files.write_files(tmp_path, dict.fromkeys("ab", b"new"))
+    assert sorted(path.read_bytes() for path in tmp_path.iterdir()) == [b"new", b"old"]
+
+
+def test_a_scene_file_takes_its_place_after_the_images_that_it_names(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    replace, order = Path.replace, []
+
+    def noted(self: Path, target: Path) -> Path:
+        order.append(target)
+        return replace(self, target)
+
+    monkeypatch.setattr(Path, "replace", noted)
+    assert export_files("grid", tmp_path) == order[::-1]
+    assert [path.name for path in order] == ["grid-grid.exr", "grid.toml"]
+
+
+@pytest.fixture(params=[0o022, 0o077, 0o002])
+def umask(request: pytest.FixtureRequest) -> Iterator[int]:
+    """Return what new files may not be, until the test ends."""
+    before = os.umask(request.param)
+    yield request.param
+    os.umask(before)
+
+
+def test_who_may_read_a_file_is_what_the_umask_says(tmp_path: Path, umask: int) -> None:
+    whole_files.write_files(tmp_path, {"a": b""})
+    write_image(tmp_path / "b.exr", np.zeros((1, 1, 3)))
+    assert {stat.S_IMODE(path.stat().st_mode) for path in tmp_path.iterdir()} == {0o666 & ~umask}
 
 
 def test_closed_and_full_outputs_are_refused_in_one_sentence(given: str) -> None:
@@ -119,7 +200,7 @@ def test_a_sound_file_is_summed_up_with_who_can_draw_it(run: Run, given: str, tm
         f"ok: {given}: given: 1 object of 2 triangles; 1 checker; 3 frames at 30 fps; shutter 0.5; facts: none; "
         "drawn by raytrace, raster, reference"
     )
-    assert second.startswith(f"ok: {lit}: lit: 0 objects of 0 triangles; no texture; 1 light; still; facts: none")
+    assert second.startswith(f"ok: {lit}: lit: no objects; no texture; 1 light; still; facts: none")
     able = second.rpartition("drawn by ")[2].split(", ")
     assert [reason.split(":")[0] for reason in reasons] == [
         f"    not by {name}" for name in ("raytrace", "raster", "reference") if name not in able
@@ -128,6 +209,45 @@ def test_a_sound_file_is_summed_up_with_who_can_draw_it(run: Run, given: str, tm
     assert rows[0]["ok"] is True
     assert rows[0]["textures"] == {"a": "checker"}
     assert rows[0]["renderers"] == {"raytrace": None, "raster": None, "reference": None}
+
+
+def test_one_file_that_takes_too_much_memory_or_cannot_be_opened_is_named_and_the_others_are_checked(
+    run: Run, given: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    large = tmp_path / "large.toml"
+    large.write_text(GIVEN)
+    read_root = checking.read_root
+
+    def too_much(root: Table, folder: Path, stem: str) -> Scene:
+        if stem == "large":
+            raise MemoryError
+        return read_root(root, folder, stem)
+
+    monkeypatch.setattr(checking, "read_root", too_much)
+    os.mkfifo(tmp_path / "fifo.toml")
+    files = [str(tmp_path / name) for name in ("large.toml", "gone.toml", "fifo.toml")]
+    code, out, err = run("scenes", "check", *files, given)
+    assert code == 2
+    first, second = out.splitlines()
+    assert first == f"{large}:1: needs more memory than there is"
+    assert second.startswith(f"ok: {given}: ")
+    assert [line.partition(".toml: ")[2] for line in err.splitlines()[:2]] == [
+        f"cannot be read ({why}); the path of a scene file (.toml) is needed"
+        for why in ("No such file or directory", "not a regular file")
+    ]
+    assert err.splitlines()[2:] == [f"aliasbench: problems: 1 in {large}"]
+
+
+@pytest.mark.parametrize("arguments", [("check", ""), ("export", "grid", "-o", "")])
+def test_a_path_without_a_character_is_none(run: Run, arguments: tuple[str, ...]) -> None:
+    assert "a path is needed" in refused(run("scenes", *arguments))
+
+
+def test_a_scene_file_may_come_through_a_pipe() -> None:
+    done = subprocess.run(
+        [*PROGRAM, "scenes", "export", "/dev/stdin"], input=GIVEN, capture_output=True, text=True, check=True
+    )
+    assert 'name = "stdin"' in done.stdout
 
 
 @pytest.mark.usefixtures("fakes")

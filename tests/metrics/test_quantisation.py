@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from aliasbench.metrics.quantisation import dither_noise, quantisation_rms, quantise
+from aliasbench.metrics.quantisation import Dither, dither_noise, quantisation_rms, quantise
 from aliasbench.scenes.errors import InputError
 from aliasbench.scenes.textures import srgb_to_linear
 
@@ -41,9 +41,9 @@ def test_the_error_over_all_values_has_its_closed_form(bits: int, dither: Any) -
 @pytest.mark.parametrize("share", [0.0, 0.1, 0.37, 0.5, 0.93])
 def test_dither_keeps_the_mean_of_any_value_and_the_triangular_one_its_noise_too(share: float) -> None:
     value = (100 + share) / 255
-    variances = {"uniform": share * (1 - share), "triangular": 0.25}
+    variances: dict[Dither, float] = {"uniform": share * (1 - share), "triangular": 0.25}
     for dither, variance in variances.items():
-        error = 255 * (quantise(np.full(MANY, value), 8, dither, seed=2) - value)  # type: ignore[arg-type]
+        error = 255 * (quantise(np.full(MANY, value), 8, dither, seed=2) - value)
         assert np.mean(error) == pytest.approx(0.0, abs=4.5 * math.sqrt(variance / MANY) + 1e-12)
         # errors lie within 3/2: fourth moments are below 9/4 of second ones
         assert np.mean(error**2) == pytest.approx(variance, abs=4.5 * 1.5 * math.sqrt(variance / MANY) + 1e-12)

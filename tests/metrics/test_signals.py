@@ -14,7 +14,7 @@ from aliasbench.metrics.signals import grating_bands, measure_rates, original_ro
 from aliasbench.scenes.catalog import build_scene
 from aliasbench.scenes.errors import InputError, UnsupportedScene
 from aliasbench.scenes.files import load_scene
-from aliasbench.scenes.model import Scene
+from aliasbench.scenes.model import Light, Material, Scene
 from aliasbench.scenes.textures import evaluate_point
 
 
@@ -69,6 +69,19 @@ def test_the_nearer_surface_hides_and_of_coplanar_ones_the_later(tmp_path: Path)
     path.write_text(text)
     found = original_rows(load_scene(str(path)), (4, 4), [2], np.array([0.5, 1.5, 2.5, 3.5]))
     np.testing.assert_array_equal(found[0, :, 0], [0.9, 0.6, 0.3, 0.0])
+
+
+def test_diffuse_without_lights_is_unlit() -> None:
+    scene = build_scene("signals:frequency=0.1,rows=4")
+    asked = ((8, 4), [1], np.linspace(0.0, 8.0, 9))
+    painted = [replace(s, material=Material("diffuse")) for s in scene.objects]
+    diffuse = replace(scene, objects=tuple(painted))
+    np.testing.assert_array_equal(original_rows(diffuse, *asked), original_rows(scene, *asked))
+    glossy = replace(scene, objects=(*painted[1:], replace(painted[0], material=Material("glossy"))))
+    light = Light(((0, 0, 1), (0, 1, 1), (1, 1, 1), (1, 0, 1)), (1.0, 1.0, 1.0))
+    for refused in (glossy, replace(diffuse, lights=(light,))):
+        with pytest.raises(UnsupportedScene, match="unlit scenes without lights and lens only"):
+            original_rows(refused, *asked)
 
 
 def test_bands_of_a_picture_are_its_gratings_in_order() -> None:
@@ -134,3 +147,11 @@ def test_rows_that_are_not_known_are_refused() -> None:
         measure_rates(scene, np.zeros((4, 19, 3)))
     with pytest.raises(UnsupportedScene, match="unlit scenes without lights and lens only"):
         original_rows(replace(scene, camera=replace(scene.camera, lens_radius=0.1)), (8, 4), [0], np.array([0.5]))
+
+
+def test_rows_whose_middle_is_on_a_border_are_in_no_band() -> None:
+    sweep = load_scene("nyquist-sweep")  # 256 bands
+    assert len(grating_bands(sweep, (128, 256))) == 256
+    assert grating_bands(sweep, (128, 128)) == ()
+    assert len(grating_bands(sweep, (128, 512))) == 256
+    assert all(len(band.rows) == 1 for band in grating_bands(sweep, (128, 384))), "of 3 rows to 2 bands one is torn"

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from aliasbench.renderers.geometry import build_bodies, coplanar_layers
+from aliasbench.renderers.geometry import MOST_LAYERS, build_bodies, coplanar_layers
+from aliasbench.scenes.errors import UnsupportedScene
 from aliasbench.scenes.model import Animation, Camera, Motion, Scene, Spin, Surface
 from aliasbench.scenes.motion import object_matrix
 
@@ -28,6 +29,30 @@ def test_overlapping_coplanar_surfaces_stack_in_their_order() -> None:
 def test_surfaces_that_share_only_an_edge_or_lie_apart_stay_in_layer_zero() -> None:
     other_half = Surface(np.array([[1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]]), np.array([[0, 1, 2]], np.int32))
     assert layers(triangle(0.0), other_half, triangle(5.0)) == [0, 0, 0]
+
+
+def test_layers_are_those_that_every_pair_of_surfaces_asks_for() -> None:
+    rng = np.random.default_rng(3)
+    # On a grid, so that some are the same, some touch, some overlap.
+    corners = [(x / 2, y / 2) for x, y in rng.integers(0, 14, (60, 2)).tolist()]
+    expected: list[int] = []
+    for k, (x, y) in enumerate(corners):
+        # Triangles of one shape overlap where their difference is within the hexagon |dx|, |dy|, |dx + dy| < 1.
+        near = [
+            expected[j]
+            for j, (u, v) in enumerate(corners[:k])
+            if abs(u - x) < 1 and abs(v - y) < 1 and abs(u - x + v - y) < 1
+        ]
+        expected.append(max(near, default=-1) + 1)
+    assert max(expected) > 2
+    assert layers(*(triangle(x, y) for x, y in corners)) == expected
+
+
+def test_as_many_surfaces_lie_on_top_of_each_other_as_layers_can_tell_apart() -> None:
+    same = [triangle(0.0)] * (MOST_LAYERS + 1)
+    assert layers(*same) == list(range(MOST_LAYERS + 1))
+    with pytest.raises(UnsupportedScene, match="more than 4096 objects on top of each other in one plane"):
+        layers(*same, triangle(0.5))
 
 
 def test_other_planes_do_not_interact() -> None:

@@ -178,5 +178,5 @@ def test_an_older_page_is_replaced_and_a_bad_place_refused(typical: Path, tmp_pa
     (out / "index.html").write_text("old", encoding="utf-8")
     assert report([typical], out).tags["table"] == 3
     (tmp_path / "file").write_text("", encoding="utf-8")
-    with pytest.raises(InputError, match=r"cannot write the report to '.*file': "):
+    with pytest.raises(InputError, match=r"cannot write into '.*file': it is a file"):
         write_report([typical], tmp_path / "file")

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from aliasbench.metrics.reconstruction import KERNELS
-from aliasbench.metrics.signals import measure_rates, original_rows
+from aliasbench.metrics.signals import RatePoint, measure_rates, original_rows
 from aliasbench.reports.page import write_report
 from aliasbench.reports.signal_figures import SHOWN_PX, Plot, draw_rates, draw_signals
 from aliasbench.scenes.catalog import build_scene
@@ -74,6 +74,28 @@ def test_rates_are_drawn_with_the_frequencies_found_and_said_in_words() -> None:
     assert "comes back from 2.00 samples per cycle on" in figure.caption
     assert "At 2.00 the amplitude is 0.00 to 1.00" in figure.caption
     assert "At 4.00 the amplitude is 1.00 to 1.00" in figure.caption
+
+
+@pytest.mark.parametrize(
+    ("recovered", "words"),
+    [
+        # right by chance at 1.5 and 2.5, wrong at 3
+        ((1 / 1.5, 1 / 2.5, 0.1, 0.25, 0.2), "from 4.00 samples per cycle on"),
+        ((0.1, 0.1, 1 / 3, 0.25, 0.2), "from 3.00 samples per cycle on"),
+        ((1 / 1.5, 1 / 2.5, 1 / 3, 0.25, 0.1), None),
+        ((1 / 1.5, 1 / 2.5, 1 / 3, 0.25, 0.2), None),
+    ],
+)
+def test_the_frequency_comes_back_from_where_all_higher_rates_have_it(
+    recovered: tuple[float, ...], words: str | None
+) -> None:
+    errors = dict.fromkeys(KERNELS, 0.1)
+    rates = [
+        RatePoint(rate, 1 / rate, found, found, 1.0, 1.0, errors, errors, {"none": 0.1}, {"none": found})
+        for rate, found in zip((1.5, 2.5, 3.0, 4.0, 5.0), recovered, strict=True)
+    ]
+    caption = draw_rates(rates[::-1]).caption
+    assert (f"comes back {words}." in caption) if words else "comes back" not in caption
 
 
 def test_nothing_is_drawn_of_narrow_pictures_and_scenes_that_are_no_rows() -> None:

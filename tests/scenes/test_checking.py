@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
@@ -11,6 +12,7 @@ from aliasbench.scenes.errors import InputError
 from aliasbench.scenes.export import export_scene
 from aliasbench.scenes.files import load_scene
 from aliasbench.scenes.lines import DEEPEST, key_lines
+from aliasbench.scenes.model import ImageTexture
 
 Write = Callable[[str], str]
 
@@ -144,3 +146,85 @@ def test_names_of_thousands_of_parts_cost_no_more_than_their_text() -> None:
     lines = key_lines(text)
     assert max(map(len, lines)) == DEEPEST
     assert lines[("e",)] == 4
+
+
+FOLLOWING = """[camera]
+projection = "perspectiv"
+fov_y_deg = 40
+[[object]]
+quad = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
+material = "glosy"
+roughness = 0.2
+[[object]]
+polgon = [[0, 0, 0], [1, 0, 0], [1, 1, 0]]
+[texture.b]
+imge = "x.png"
+[texture.c]
+grating = { cyles = 2 }
+"""
+
+
+def test_what_only_follows_from_a_misspelt_word_is_not_told(scene_file: Write) -> None:
+    findings = check_scene_file(Path(scene_file(FOLLOWING))).findings
+    assert [f.line for f in findings] == [2, 6, 9, 11, 13]
+    assert all("did you mean" in f.text for f in findings)
+
+
+def test_messages_are_one_printable_line_however_long_and_strange_what_they_quote_is(scene_file: Write) -> None:
+    many = "".join(f"[texture.t{k}]\nchecker = {{ squares = [1, 1] }}\n" for k in range(200))
+    text = f"""[[object]]
+mesh = "\\u202e\\u0007\\n.obj"
+[[object]]
+mesh = "{"x" * 100_000}.obj"
+[[object]]
+quad = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
+texture = "nope"
+[texture.a]
+image = "data:image/{"a" * 100_000};base64,AAAA"
+{many}"""
+    findings = check_scene_file(Path(scene_file(text))).findings
+    assert [f.line for f in findings] == [2, 4, 7, 9]
+    assert all(f.text.isprintable() and len(f.text) < 3000 for f in findings)
+    assert "and 181 more" in findings[2].text
+
+
+@pytest.mark.parametrize("stem", ["new\nline", "esc\x1b[31m", "x" * 240])
+def test_a_file_of_any_name_is_a_scene(tmp_path: Path, stem: str) -> None:
+    path = tmp_path / f"{stem}.toml"
+    path.write_text("schema = 1")
+    scene = check_scene_file(path).scene
+    assert scene is not None
+    assert scene.name.isprintable()
+    assert len(scene.name) == min(len(stem), 200)
+
+
+def test_an_image_is_read_once_and_all_together_stay_within_the_limit(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "a.hdr").write_bytes(b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 4 +X 4\n" + bytes(64))
+    (tmp_path / "b.hdr").write_bytes((tmp_path / "a.hdr").read_bytes())
+    texts = [f"[texture.t{k}]\nimage = 'a.hdr'\nalpha_cutoff = 0.{k}\n" for k in range(1, 5)]
+    path = tmp_path / "given.toml"
+    path.write_text("".join(texts))
+    monkeypatch.setattr("aliasbench.scenes.file_textures.FREE_TEXELS", 31)
+    monkeypatch.setattr("aliasbench.scenes.file_textures.TEXELS_PER_BYTE", 0)
+    images = [texture for texture in load_scene(str(path)).textures.values() if isinstance(texture, ImageTexture)]
+    assert [image.alpha_cutoff for image in images] == [0.1, 0.2, 0.3, 0.4]
+    assert all(image.texels is images[0].texels for image in images)
+    path.write_text("".join([*texts, "[texture.b]\nimage = 'b.hdr'"]))
+    (finding,) = check_scene_file(path).findings
+    assert finding.key == "texture.b.image"
+    assert "has 4 x 4 texels; at most 15 are allowed" in finding.text
+
+
+def test_what_a_model_s_own_animation_does_is_told_of_the_mesh(
+    tmp_path: Path, gltf: ModuleType, write: Callable[..., Path]
+) -> None:
+    builder = gltf.plain()
+    gltf.add_animation(builder, 0, "translation", builder.array([0.0, 0.01]), builder.array([(0, 0, 0), (1e11, 0, 0)]))
+    write(builder, "fast.glb")
+    path = tmp_path / "given.toml"
+    path.write_text("[animation]\nframes = 30\n[[object]]\nmesh = 'fast.glb'")
+    (finding,) = check_scene_file(path).findings
+    assert (finding.line, finding.key) == (4, "object[0].mesh")
+    assert "must be a model with a velocity within 1e+12 of the origin" in finding.text

@@ -256,7 +256,7 @@ def test_a_scene_is_named_by_a_text(given: Any) -> None:
 
 
 def test_arrays_without_end_are_refused_in_a_sentence(scene_file: Write) -> None:
-    with pytest.raises(InputError, match=r"nested too deeply|not valid TOML"):
+    with pytest.raises(InputError, match=r"line 1: nested more than 100 deep"):
         load_scene(scene_file("a = " + "[" * 100_000))
 
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from aliasbench.scenes.lines import key_lines, line_of
+from aliasbench.scenes.lines import MOST_NESTED, MOST_PARTS, excess, key_lines, line_of
 from aliasbench.scenes.problems import Place
 from aliasbench.scenes.toml_text import key_text, written
 
@@ -112,3 +112,33 @@ def test_keys_are_found_on_the_lines_on_which_they_were_written(file: dict[str, 
     lines = key_lines(joined)
     assert set(lines) == set(places(file))
     assert {place: lines[place] for place in expected} == expected
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        f"[{'.'.join('a' * MOST_PARTS)}]\n{' . '.join('b' * MOST_PARTS)} = 1",
+        f"a = {'[' * MOST_NESTED}{']' * MOST_NESTED}\n" * 3,
+        f'a = \'{"[." * 1000}\' # {"{." * 1000}\nb = """\n{"a." * 1000}"""\nc = [{"1.5, " * 1000}]',
+    ],
+)
+def test_what_is_within_strings_and_comments_is_not_counted(text: str) -> None:
+    assert excess(text) is None
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        (f"# a\n\n{'.'.join('b' * (MOST_PARTS + 1))} = 1", "a name of more than 50 parts"),
+        ("\n\n[[" + ".".join(['"b"'] * (MOST_PARTS + 1)) + "]]", "a name of more than 50 parts"),
+        (f"a = [\n1,\n{'[' * MOST_NESTED}", "nested more than 100 deep"),
+    ],
+)
+def test_what_is_too_much_is_told_with_its_line(text: str, found: str) -> None:
+    assert excess(text) == (3, found)
+
+
+def test_the_time_to_look_grows_with_the_length_whatever_the_text_is() -> None:
+    # A string that never ends is looked for once, not from every line on.
+    assert excess('\\"""\n' * 100_000) is None
+    assert excess(f"x {chr(39) * 3}\n" * 100_001) is None

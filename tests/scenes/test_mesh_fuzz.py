@@ -28,7 +28,10 @@ def test_the_undamaged_files_load(fuzz: ModuleType, tmp_path: Path) -> None:
     for name, data in fuzz.seeds().items():
         (tmp_path / name).write_bytes(data)
     models = sorted(p for p in tmp_path.iterdir() if not p.name.startswith("seed"))
-    assert [sum(len(s.triangles) for s in load_scene(str(p)).objects) for p in models] == [960, 5, 960, 6, 960, 6]
+    counts = {p.name: sum(len(s.triangles) for s in load_scene(str(p)).objects) for p in models}
+    # Of the coloured copies some triangles are cut out by their alpha.
+    assert 2000 < counts.pop("colors.gltf") < 6000
+    assert list(counts.values()) == [960, 5, 960, 6, 960, 6]
 
 
 @pytest.mark.parametrize("seed", [11, 12])

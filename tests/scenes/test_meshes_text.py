@@ -2,6 +2,7 @@
 
 import struct
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,7 +11,8 @@ import trimesh
 from aliasbench.scenes.errors import InputError
 from aliasbench.scenes.files import load_scene
 from aliasbench.scenes.meshes import load_mesh
-from aliasbench.scenes.textures import evaluate_point, srgb_to_linear
+from aliasbench.scenes.model import ImageTexture
+from aliasbench.scenes.textures import evaluate_point, load_image, srgb_to_linear
 
 HEAD = """ply
 format {format} 1.0
@@ -235,3 +237,54 @@ def test_only_known_kinds_of_model_files_are_read(tmp_path: Path) -> None:
         (tmp_path / name).mkdir()
         with pytest.raises(InputError, match=f"{name}: not a regular file"):
             load_scene(str(tmp_path / name))
+
+
+def test_a_line_of_libraries_may_name_several_or_one_with_blanks(tmp_path: Path) -> None:
+    text = OBJ.format("1/1 2/2 3/3") + "usemtl green\nf 1 2 3\n"
+    (tmp_path / "b.mtl").write_text("newmtl green\nKd 0 1 0\n")
+    assert [s.color for s in load_mesh(obj(tmp_path, text.replace("a.mtl", "a.mtl  b.mtl"))).surfaces][1] == (0, 1, 0)
+    (tmp_path / "a.mtl b.mtl").write_text(MTL.format("a.ppm") + "newmtl green\nKd 0 0.5 0\n")
+    assert [s.color for s in load_mesh(obj(tmp_path, text.replace("a.mtl", "a.mtl b.mtl"))).surfaces][1] == (0, 0.5, 0)
+    with pytest.raises(InputError, match="names more than 64 material libraries"):
+        load_mesh(obj(tmp_path, text.replace("a.mtl", "a.mtl " * 65)))
+
+
+def test_comments_behind_numbers_are_no_part_of_them(tmp_path: Path) -> None:
+    (tmp_path / "a.mtl").write_text("newmtl no #1\nKd 0 1 0\n")
+    (tmp_path / "a.obj").write_text(
+        "mtllib a.mtl\nv 0 0 0 # first\nv 1 0 0#second\n# all\nv 0 1 0\nusemtl no #1\nf 1 2 3 # 4\nf 1 2 9 # tri\n"
+    )
+    with pytest.raises(InputError, match="line 8: there is no vertex 9"):
+        load_mesh(tmp_path / "a.obj")
+    (tmp_path / "a.obj").write_text((tmp_path / "a.obj").read_text().replace("9 # tri", "3 # tri"))
+    (surface,) = load_mesh(tmp_path / "a.obj").surfaces
+    assert surface.color == (0, 1, 0)
+    assert len(surface.triangles) == 2
+
+
+def test_images_are_told_apart_by_their_paths_and_read_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "sub").mkdir()
+    (tmp_path / "sub" / "a.ppm").write_bytes(PPM[:-1] + b"\0")
+    names = ("a.ppm", "sub/a.ppm", "sub/../a.ppm", "sub\\a.ppm", "./sub/a.ppm")
+    mtl = "".join(f"newmtl m{k}\nmap_Kd {name}\n" for k, name in enumerate(names))
+    text = OBJ.format("1/1 2/2 3/3").replace("usemtl pic", "usemtl m0")
+    path = obj(tmp_path, text + "".join(f"usemtl m{k}\nf 1/1 2/2 3/3\n" for k in range(1, 5)), mtl)
+    read: list[Path] = []
+
+    def counted(path: Path, **more: Any) -> ImageTexture:
+        read.append(path)
+        return load_image(path, **more)
+
+    monkeypatch.setattr("aliasbench.scenes.mesh_obj.load_image", counted)
+    model = load_mesh(path)
+    assert [s.texture for s in model.surfaces] == ["a.obj#a.ppm", "a.obj#sub/a.ppm"]
+    assert len(read) == 2
+    assert model.textures["a.obj#a.ppm"] != model.textures["a.obj#sub/a.ppm"]
+
+
+@pytest.mark.parametrize("line", ["property float x\n", "property list uchar float x\n"])
+def test_a_property_that_is_there_twice_is_refused(tmp_path: Path, line: str) -> None:
+    data = ply("", [[0, 1, 2]]).replace(b"property float y\n", line.encode() + b"property float y\n")
+    (tmp_path / "a.ply").write_bytes(data)
+    with pytest.raises(InputError, match=r"a.ply: line 6: element vertex has a property 'x' already"):
+        load_mesh(tmp_path / "a.ply")

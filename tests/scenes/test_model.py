@@ -1,11 +1,13 @@
 """Content decides equality: every value of a scene counts, and nothing else does."""
 
 from dataclasses import fields, replace
+from typing import get_args
 
 import numpy as np
 import pytest
 
 from aliasbench.scenes.model import (
+    TEXTURE_KINDS,
     Animation,
     Camera,
     Checker,
@@ -18,6 +20,8 @@ from aliasbench.scenes.model import (
     Scene,
     Spin,
     Surface,
+    Texture,
+    as_vec3,
     content_digest,
     read_only,
 )
@@ -136,3 +140,13 @@ def test_a_scene_is_static_when_nothing_in_it_moves(motion: Motion, static: bool
     assert replace(scene, objects=(quad(CORNERS, motion=motion),)).is_static is static
     assert not replace(scene, camera=replace(scene.camera, velocity=(1.0, 0.0, 0.0))).is_static
     assert not replace(scene, camera=replace(scene.camera, target_velocity=(1.0, 0.0, 0.0))).is_static
+
+
+def test_every_texture_has_a_name_of_its_own() -> None:
+    assert set(TEXTURE_KINDS) == set(get_args(Texture))
+    assert len(set(TEXTURE_KINDS.values())) == len(TEXTURE_KINDS)
+
+
+def test_a_vector_is_three_plain_numbers_without_negative_zeros() -> None:
+    vector = as_vec3(np.array([-0.0, 1 / 3, -2.5]))
+    assert repr(vector) == f"(0.0, {1 / 3!r}, -2.5)"

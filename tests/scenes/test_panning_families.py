@@ -9,6 +9,7 @@ from aliasbench.scenes.catalog import SCENES, build_scene
 from aliasbench.scenes.model import FloatArray, Scene
 from aliasbench.scenes.motion import object_matrix
 from aliasbench.scenes.projection import View, view_at
+from aliasbench.scenes.walls import SHIFT
 
 WALLS = ("brick-wall", "page-wall", "photo-wall", "photo-wall:photo=coins,speed=-0.5", "page-wall:height=0.5")
 
@@ -26,7 +27,7 @@ def test_a_wall_loops_over_whole_photographs_of_square_texels(name: str) -> None
     (wall,), (texture,) = scene.objects, scene.textures.values()
     assert wall.uv is not None
     rows, columns = getattr(texture, "texels", np.zeros((1, 1))).shape[:2]
-    np.testing.assert_allclose(wall.uv * (columns, rows), wall.vertices[:, :2] * columns, rtol=1e-14)
+    np.testing.assert_allclose(wall.uv * (columns, rows), wall.vertices[:, :2] * columns - SHIFT, rtol=1e-14)
     moved = first_view(scene, frame=scene.animation.frames).origin - first_view(scene).origin
     assert moved[0] == round(moved[0]) != 0.0
     assert moved[1] == moved[2] == 0.0
@@ -118,6 +119,24 @@ def test_rows_of_the_turning_camera_do_not_hide_each_other() -> None:
         spans[-surface.vertices[0, 2]] = (slopes.min(), slopes.max())
     assert sorted(spans) == [3.0, 5.0, 10.0]
     assert spans[3.0][1] < spans[5.0][0] < spans[5.0][1] < spans[10.0][0]
+
+
+@pytest.mark.parametrize(
+    ("turn", "travel", "wide"), [(60.0, 0.0, 4), (-90.0, 0.0, 4), (0.0, 10.0, 4), (5.0, -3.0, 4), (90.0, -10.0, 2)]
+)
+@pytest.mark.parametrize("kind", ["posts", "bricks"])
+def test_rows_of_the_turning_camera_go_on_outside_of_wide_pictures(
+    turn: float, travel: float, wide: int, kind: str
+) -> None:
+    scene = SCENES["camera-turn"].build(turn=turn, travel=travel, shutter=1.0, kind=kind)
+    ends = np.concatenate([s.vertices for s in scene.objects])
+    for frame, fraction in ((0, 0.0), (scene.animation.frames - 1, 1.0)):
+        view = first_view(scene, (100 * wide, 100), frame, fraction)
+        for depth in (3.0, 5.0, 10.0):
+            row = ends[np.isclose(ends[:, 2], -depth)]
+            for end, side in ((row[:, 0].min(), -1.0), (row[:, 0].max(), 1.0)):
+                x, _, ahead = view.project(np.array([[end, 0.0, -depth]]))[0]
+                assert ahead <= 0.0 or side * (x - 50.0 * wide) > 50.0 * wide
 
 
 def test_a_camera_that_neither_turns_nor_travels_is_at_rest() -> None:

@@ -51,6 +51,8 @@ def test_texels_are_the_files_in_linear_light_bottom_row_first(name: str) -> Non
 
 def test_a_photograph_is_one_object_under_all_its_names_and_shares_texels_with_its_cuts() -> None:
     brick = load_photograph("brick")
+    # as many as there are: none is forgotten for another
+    assert photographs._load.cache_info().maxsize == len(PHOTOGRAPHS)
     assert load_photograph("brick.png") is load_photograph("skimage:brick.png") is load_photograph("skimage:brick")
     assert load_photograph("brick") is brick
     cut = load_photograph("brick.png", alpha_cutoff=0.25)

@@ -10,14 +10,23 @@ import OpenImageIO as oiio
 import pytest
 
 from aliasbench.scenes.errors import InputError
-from aliasbench.scenes.model import Checker, Grating, ImageTexture, Texture, ZonePlate
-from aliasbench.scenes.textures import MipChain, evaluate_point, linear_to_srgb, load_image, mip_chain, srgb_to_linear
+from aliasbench.scenes.model import Camera, Checker, Grating, ImageTexture, Scene, Texture, ZonePlate
+from aliasbench.scenes.shapes import quad
+from aliasbench.scenes.textures import (
+    MipChain,
+    evaluate_point,
+    linear_to_srgb,
+    load_image,
+    mip_chain,
+    scene_chain,
+    srgb_to_linear,
+)
 
 
 def write(path: Path, pixels: np.ndarray) -> Path:
     out = oiio.ImageOutput.create(str(path))
     assert out is not None, oiio.geterror()
-    kind = oiio.UINT8 if pixels.dtype == np.uint8 else oiio.FLOAT
+    kind = {"uint8": oiio.UINT8, "uint16": oiio.UINT16}.get(pixels.dtype.name, oiio.FLOAT)
     assert out.open(str(path), oiio.ImageSpec(pixels.shape[1], pixels.shape[0], pixels.shape[2], kind))
     assert out.write_image(pixels)
     out.close()
@@ -87,6 +96,29 @@ def test_an_image_with_a_value_that_is_not_finite_is_refused(tmp_path: Path) -> 
 def test_values_that_no_picture_holds_are_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"has a value of 1e\+16; at most 1e\+15 is allowed"):
         load_image(write(tmp_path / "a.exr", np.full((1, 1, 3), 1e16, np.float32)))
+
+
+def test_a_damaged_exr_is_read_or_refused_in_a_sentence(tmp_path: Path) -> None:
+    path = write(tmp_path / "a.exr", np.ones((8, 8, 3), np.float32))
+    data = path.read_bytes()
+    said = []
+    for k in range(0, len(data), 3):
+        path.write_bytes(data[:k] + b"\xff" + data[k + 1 :])
+        try:
+            load_image(path)
+        except InputError as error:
+            said.append(str(error))
+    assert len(said) > 10
+    assert all(text.isprintable() for text in said)
+    assert any("damaged" in text for text in said)
+
+
+def test_sixteen_bits_are_read_as_srgb_and_alpha_as_it_is(tmp_path: Path) -> None:
+    values = np.array([0, 1, 2570, 32768, 65535], np.uint16)
+    paths = [write(tmp_path / f"{n}.png", np.repeat(values, n).reshape(1, 5, n)) for n in (3, 4)]
+    grey, clear = (load_image(path).texels[0] for path in paths)
+    np.testing.assert_allclose(grey[:, 0], srgb_to_linear(values / 65535), rtol=1e-7)
+    np.testing.assert_allclose(clear[:, 3], values / 65535, rtol=1e-7)
 
 
 @pytest.mark.parametrize("damage", ["corrupt", "cut off"])
@@ -184,17 +216,85 @@ def test_levels_halve_down_to_one_texel(name: str) -> None:
         assert (h2, w2) == (max(1, h // 2), max(1, w // 2))
 
 
-@pytest.mark.parametrize("name", ["checker", "grating", "zone plate", "odd"])
-def test_the_first_level_seen_through_its_matrix_is_the_texture(name: str) -> None:
-    texture, chain = TEXTURES[name], chain_of(name)
-    h, w = chain.levels[0].shape[:2]
-    rows, columns = np.mgrid[0:h:7, 0:w:7] if name != "odd" else np.mgrid[0:h, 0:w]
-    tile = np.stack([(columns.ravel() + 0.5) / w, (rows.ravel() + 0.5) / h])
+def area_mean(
+    texture: Texture, linear: np.ndarray, offset: np.ndarray, low: np.ndarray, high: np.ndarray
+) -> np.ndarray:
+    """The mean of a formula over a box of its image's coordinates: Gauss for smooth ones, a raster for steps."""
+    if isinstance(texture, ZonePlate):
+        # nodes for the radians that the phase turns by in the box, which is less than 2 uv from the plate's middle
+        nodes, weights = np.polynomial.legendre.leggauss(
+            24 + int(4 * abs(texture.k) * np.max((high - low) / linear.diagonal()))
+        )
+    elif isinstance(texture, Grating) and texture.profile == "sine":
+        nodes, weights = np.polynomial.legendre.leggauss(24)
+    else:
+        # a power of two: steps are between its cells
+        nodes, weights = (np.arange(64) + 0.5) / 32 - 1, np.full(64, 2 / 64)
+    places = (low + high)[:, None] / 2 + (high - low)[:, None] / 2 * nodes
+    tile = np.stack(np.broadcast_arrays(places[0], places[1][:, None]), axis=-1)
+    values = evaluate_point(texture, (tile - offset) @ np.linalg.pinv(linear).T)
+    mean: np.ndarray = np.einsum("vuc,v,u->c", values, weights, weights) / 4
+    return mean
+
+
+@pytest.mark.parametrize(
+    ("texture", "low", "high"),
+    [
+        (Checker((7.3, 3.0), (0.1, 0.2, 0.3), (0.7, 1.0, 0.5)), (0.0, 0.0), (1.0, 1.0)),
+        (Grating(11.4, 20.0, 0.3, "sine", (0.2,) * 3, (1.0,) * 3), (0.0, 0.0), (1.0, 1.0)),
+        (Grating(0.7, -70.0, -0.1, "square"), (0.0, 0.0), (1.0, 1.0)),
+        (ZonePlate((0.5, 0.5), 100.0), (0.0, 0.0), (1.0, 1.0)),
+        (ZonePlate((-0.3, 0.6), 40000.0, 1.0), (-0.5, 0.2), (-0.2, 0.9)),
+        (ZonePlate((0.5, 0.5), -9000.0, -2.0), (-6.75, -0.25), (2.75, 1.25)),
+        (ZonePlate((0.0, 0.0), 0.0, 0.4), (-30.0, 0.0), (1000.0, 1.0)),
+    ],
+)
+def test_every_level_of_an_analytic_texture_has_its_means_over_areas(
+    texture: Texture, low: tuple[float, float], high: tuple[float, float]
+) -> None:
+    chain = mip_chain(texture, low, high)
     linear, offset = chain.uv_matrix[:, :2], chain.uv_matrix[:, 2]
-    uv = (np.linalg.pinv(linear) @ (tile - offset[:, None])).T
-    expected = chain.levels[0][rows.ravel(), columns.ravel()]
-    # float32 texels; uv through the inverse costs some ulp of a phase of up to 100 radians
-    np.testing.assert_allclose(evaluate_point(texture, uv), expected, rtol=0, atol=2**-24 + 1e-12)
+    rng = np.random.default_rng(8)
+    for depth, level in enumerate(chain.levels):
+        size = np.array(level.shape[1::-1])
+        if isinstance(texture, ZonePlate) and 2 * abs(texture.k) / size.min() / linear.max() > 40:
+            continue  # too many nodes
+        for _ in range(3):
+            texel = rng.integers(size)
+            expected = area_mean(texture, linear, offset, texel / size, (texel + 1) / size)
+            # levels are rounded to float32; 1e-9: phases of 10^5 radians
+            atol = (depth + 1) * 2**-24 + 1e-9
+            np.testing.assert_allclose(level[texel[1], texel[0]], expected, rtol=0, atol=atol)
+
+
+@pytest.mark.parametrize("plates", [1, 20, 10**6])
+@pytest.mark.parametrize("high", [(1.0, 1.0), (3.0, 0.3), (1e5, 1.0), (-0.6999, 0.1001)])
+def test_a_zone_plate_s_image_covers_what_is_looked_at_and_is_of_a_bounded_size(
+    high: tuple[float, float], plates: int
+) -> None:
+    chain = mip_chain(ZonePlate((0.5, 0.5), 10.0), (-0.7, 0.1), high, plates)
+    height, width = chain.levels[0].shape[:2]
+    assert width * height <= max(2**23 // plates, 2**17)
+    assert max(width, height) <= 8192
+    tile = np.array([(-0.7, 0.1, 1.0), (*high, 1.0)]) @ chain.uv_matrix.T
+    # with room for what filters see beyond; rounding aside
+    assert (tile * (width, height) >= 63.99).all()
+    assert (tile * (width, height) <= np.array([width, height]) - 63.99).all()
+    # square texels, a power of two of them to a unit
+    assert chain.uv_matrix[0, 0] * width == pytest.approx(chain.uv_matrix[1, 1] * height)
+    assert np.log2(chain.uv_matrix[0, 0] * width) % 1 == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_scene_s_chain_covers_all_surfaces_that_show_the_plate_and_no_others() -> None:
+    uvs = ([(0, 0), (1, 0), (1, 1), (0, 1)], [(-2, 0), (-1, 0), (-1, 1), (-2, 1)], [(0, 0), (9, 0), (9, 9), (0, 9)])
+    corners = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 1.0, 0.0), (0.0, 1.0, 0.0)]
+    objects = [quad(corners, uv=uv, texture=name) for uv, name in zip(uvs, ("a", "a", "b"), strict=True)]
+    textures: dict[str, Texture] = {"a": ZonePlate((0.0, 0.0), 9.0), "b": Checker((2.0, 2.0))}
+    scene = Scene("two", Camera("orthographic", height=2.0), tuple(objects), textures)
+    np.testing.assert_array_equal(
+        scene_chain(scene, "a").uv_matrix, mip_chain(textures["a"], (-2.0, 0.0), (1.0, 1.0)).uv_matrix
+    )
+    np.testing.assert_array_equal(scene_chain(scene, "b").uv_matrix, mip_chain(textures["b"]).uv_matrix)
 
 
 def test_halving_an_even_image_averages_two_by_two() -> None:

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from aliasbench.scenes.toml_text import assignment, header, inline_table, safe_file_name, written
+from aliasbench.scenes.toml_text import assignment, free_file_name, header, inline_table, safe_file_name, written
 
 
 @settings(max_examples=200, deadline=None)
@@ -39,3 +39,10 @@ def test_bools_integers_and_nested_lists_keep_their_kind() -> None:
 )
 def test_a_file_name_holds_nothing_that_a_file_system_minds(text: str, name: str) -> None:
     assert safe_file_name(text) == name
+
+
+def test_a_taken_file_name_is_numbered_whatever_its_case() -> None:
+    taken: list[str] = []
+    for stem in ("a", "A", "a-2", "a", "b"):
+        taken.append(free_file_name(stem, ".exr", taken))
+    assert taken == ["a.exr", "A-2.exr", "a-2-2.exr", "a-3.exr", "b.exr"]

@@ -138,9 +138,10 @@ def test_far_minified_textures_tend_to_their_mean(make, name):
     corners_uv = [(0, 0), (512, 0), (512, 512), (0, 512)]
     scene = make.scene(textured_square(make, corners_uv), camera=camera, textures={"t": texture})
     pixels = render(scene, "raster:texture=trilinear", size=(16, 16)).pixels
-    mean = mip_chain(texture).levels[-1][0, 0, :3]
+    # a zone plate's rings come to pi / 2k at most in one of the pixels, which are 32 units wide and high
+    mean = 0.5 if name == "zone" else mip_chain(texture).levels[-1][0, 0, :3]
     expected = np.broadcast_to(mean, pixels.shape)
-    np.testing.assert_allclose(pixels, expected, atol=1e-6)
+    np.testing.assert_allclose(pixels, expected, atol=np.pi / 300 / 32**2 if name == "zone" else 1e-6)
 
 
 def test_large_texture_coordinates_lose_no_precision(make):
