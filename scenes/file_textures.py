@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from aliasbench.scenes.errors import InputError
-from aliasbench.scenes.gltf_materials import FREE_TEXELS, TEXELS_PER_BYTE
+from aliasbench.scenes.gltf_textures import FREE_TEXELS, TEXELS_PER_BYTE
 from aliasbench.scenes.inline_data import DATA_PREFIX, decode_image
 from aliasbench.scenes.limits import COUNT
 from aliasbench.scenes.local_files import is_local

@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 from aliasbench.scenes.errors import InputError
 from aliasbench.scenes.gltf_animation import read_animation
 from aliasbench.scenes.gltf_document import Document, as_reals, entries
-from aliasbench.scenes.gltf_materials import Look, TextureReader, read_look
+from aliasbench.scenes.gltf_materials import Look, read_look
 from aliasbench.scenes.gltf_nodes import Placed, walk_nodes
+from aliasbench.scenes.gltf_textures import TextureReader
 from aliasbench.scenes.limits import COUNT, LENGTH, MIN_FOV_DEG, MIN_LENGTH, RADIANCE
 from aliasbench.scenes.mesh_parts import Indices, Part, check_amount
 from aliasbench.scenes.model import Camera, FloatArray, ImageTexture, Motion, Vec3, as_vec3

@@ -28,6 +28,7 @@ _EXTENSIONS = ("KHR_texture_transform", "KHR_mesh_quantization", "KHR_lights_pun
 _MOST_MARKS = 4_000_000  # brackets and commas: what the JSON comes to in memory
 _MOST_TEXT = 64_000_000  # bytes of JSON
 _MOST_NODES = 100_000
+_MOST_ENTRIES = 200_000  # of any other list
 _COMPONENTS: Mapping[int, str] = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _WIDTHS: Mapping[str, int] = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 
@@ -173,9 +174,10 @@ def read_document(path: Path) -> Document:
         if name not in _EXTENSIONS and not name.startswith("KHR_materials_"):
             problem = unknown_name("required extension", name, (*_EXTENSIONS, "KHR_materials_..."))
             raise InputError(f"{file}: extensionsRequired: {problem}")
-    nodes = root.values.get("nodes")
-    if isinstance(nodes, list) and len(nodes) > _MOST_NODES:
-        raise InputError(f"{file}: nodes: there are {len(nodes)}; at most {_MOST_NODES} are allowed")
+    for key in LISTS:
+        listed, most = root.values.get(key), _MOST_NODES if key == "nodes" else _MOST_ENTRIES
+        if isinstance(listed, list) and len(listed) > most:
+            raise InputError(f"{file}: {key}: there are {len(listed)}; at most {most} are allowed")
     lists = {key: entries(root, key) for key in LISTS}
     buffers = Buffers(lists["buffers"], binary, path.parent)
     return Document(root, lists, buffers, path.parent, len(data) + buffers.size)

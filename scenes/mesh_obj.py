@@ -54,7 +54,7 @@ def read_obj(
     InputError
         If a line cannot be read, an index has no vertex, or a material or a texture is missing or not beside the file.
     """
-    lines = _joined(data.splitlines())
+    lines = _joined(data.splitlines()) if b"\\" in data else data.splitlines()
     try:
         return _read_lines(lines, len(data), path, label, retextured)
     except InputError:
@@ -66,8 +66,6 @@ def read_obj(
 
 def _joined(lines: list[bytes]) -> list[bytes]:
     """Return lines with those that a backslash continues as one at the first one's place, empty ones at the others'."""
-    if not any(line.endswith(b"\\") for line in lines):
-        return lines
     out = [b""] * len(lines)
     first, pieces = 0, list[bytes]()
     for k, line in enumerate(lines):

@@ -86,6 +86,8 @@ def load_image(
             raise InputError(f"{what}: {'not a regular file' if path.exists() else 'no such file'}")
     except OSError as error:
         raise InputError(f"{what}: cannot be read ({error.strerror})") from error
+    if any("\udc80" <= c <= "\udcff" for c in str(path)):  # bytes of no encoding, which the library cannot open
+        raise InputError(f"{what}: cannot be read (its path is not UTF-8)")
     with silenced_stderr():
         # A colour is a colour wherever it is drawn: the library would otherwise return it multiplied by its alpha.
         options = oiio.ImageSpec()

@@ -61,8 +61,61 @@ def test_alpha_cuts_out_where_the_mode_says_so(gltf: ModuleType, write: Write) -
     faded = gltf.textured(half, alphaMode="MASK", factor=[1, 1, 1, 0.8])
     (texture,) = load_mesh(write(faded)).textures.values()
     assert texture.alpha_cutoff == pytest.approx(0.625)
-    with pytest.raises(InputError, match="has no triangle with an area"):
-        load_mesh(write(gltf.textured(half, alphaMode="MASK", factor=[1, 1, 1, 0.4])))
+    for mode, rule in (("MASK", "its cutoff"), ("BLEND", "at which BLEND is drawn as a cut-out")):
+        with pytest.raises(InputError, match=rf"all of its parts are transparent: .*alpha 0.4 is below 0.5, {rule}"):
+            load_mesh(write(gltf.textured(half, alphaMode=mode, factor=[1, 1, 1, 0.4])))
+
+
+@pytest.mark.parametrize(
+    ("color", "emissive", "wanted"),
+    [
+        ([0, 0, 0, 1], {"emissiveFactor": [1, 0.5, 0]}, [1, 0.5, 0]),
+        ([0.25, 0.5, 0, 1], {"emissiveFactor": [0.25, 0, 0.5]}, [0.5, 0.5, 0.5]),
+        (
+            [0.5, 0, 0, 1],
+            {
+                "emissiveFactor": [0, 0, 1],
+                "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 3}},
+            },
+            [0.5, 0, 3],
+        ),
+        ([0.5, 0, 0, 1], {"emissiveFactor": [0, 0, 1], "extensions": {"KHR_materials_unlit": {}}}, [0.5, 0, 0]),
+    ],
+)
+def test_what_shines_is_added_to_the_colour(
+    gltf: ModuleType, write: Write, color: list[float], emissive: dict[str, object], wanted: list[float]
+) -> None:
+    builder = gltf.plain(material=0)
+    builder.document["materials"] = [{"pbrMetallicRoughness": {"baseColorFactor": color}, **emissive}]
+    (surface,) = load_mesh(write(builder)).surfaces
+    assert list(surface.color) == wanted
+    # Colours of vertices multiply what is lit only.
+    attributes = builder.document["meshes"][0]["primitives"][0]["attributes"]
+    attributes["COLOR_0"] = builder.array([(0, 0, 0)] * 4)
+    (surface,) = load_mesh(write(builder)).surfaces
+    assert list(surface.color) == [w - c for w, c in zip(wanted, color, strict=False)]
+
+
+def test_an_emissive_texture_is_drawn_where_the_base_is_black_and_left_out_elsewhere(
+    gltf: ModuleType, write: Write
+) -> None:
+    shining = {"emissiveFactor": [1, 0.5, 1], "emissiveTexture": {"index": 0}}
+    model = load_mesh(write(gltf.textured(factor=[0, 0, 0, 1], **shining)))
+    (surface,) = model.surfaces
+    assert surface.color == (1, 0.5, 1)
+    assert surface.texture is not None
+    assert model.textures[surface.texture].texels[1, 0, :3].tolist() == [1, 0, 0]
+    for more in ({"factor": [1, 1, 0, 1]}, {"factor": [0, 0, 0, 1], "alphaMode": "MASK"}):
+        (surface,) = load_mesh(write(gltf.textured(**more, **shining))).surfaces
+        assert list(surface.color) == more["factor"][:3]
+    # Without a texture of its own black times the base's is black.
+    (surface,) = load_mesh(write(gltf.textured(factor=[0, 0, 0, 1], emissiveFactor=[0, 1, 0]))).surfaces
+    assert (surface.color, surface.texture) == ((0, 1, 0), None)
+
+
+def test_emissive_values_are_not_negative(gltf: ModuleType, write: Write) -> None:
+    with pytest.raises(InputError, match=r"emissiveFactor = \[0, -1, 0\]: must be three numbers of at least 0"):
+        load_mesh(write(gltf.textured(emissiveFactor=[0, -1, 0])))
 
 
 @pytest.mark.parametrize("axis", ["wrapS", "wrapT"])
@@ -145,7 +198,7 @@ def test_alpha_at_vertices_cuts_out_triangles_and_multiplies_the_textures(
     assert texture.alpha_cutoff == (None if mode == "OPAQUE" else pytest.approx(0.5 * 3 / 2.2))
     attributes["COLOR_0"] = builder.array([(1, 1, 1, 0.25)] * 4)
     if mode != "OPAQUE":
-        with pytest.raises(InputError, match="has no triangle with an area"):
+        with pytest.raises(InputError, match=r"all of its parts are transparent: the alpha of COLOR_0 of .* below 0.5"):
             load_mesh(write(builder))
 
 

@@ -1,6 +1,7 @@
 """Damaged glTF files, and those that ask for too much, are refused in one sentence that names the place."""
 
 import base64
+import json
 import math
 import struct
 import zlib
@@ -14,6 +15,7 @@ import pytest
 
 from aliasbench.scenes.errors import InputError
 from aliasbench.scenes.files import load_scene
+from aliasbench.scenes.local_files import read_local
 from aliasbench.scenes.meshes import load_mesh
 
 Write = Callable[..., Path]
@@ -103,15 +105,111 @@ def test_indices_have_a_vertex(gltf: ModuleType, write: Write) -> None:
 
 def test_few_bytes_cannot_ask_for_much(gltf: ModuleType, write: Write) -> None:
     builder = gltf.Builder()
-    many = builder.array(np.zeros((3000, 3)))
+    many = builder.array(np.zeros((30000, 3)))
     primitive = {"attributes": {"POSITION": many}}
-    builder.document["meshes"] = [{"primitives": [primitive] * 1000}]
+    builder.document["meshes"] = [{"primitives": [primitive] * 100}]
     builder.document["nodes"] = [{"mesh": 0, "children": list(range(1, 40))}, *[{"mesh": 0}] * 39]
     with pytest.raises(InputError, match=r"comes to 40000000 triangles; at most 20000000 are allowed"):
         load_mesh(write(builder))
     builder.document["nodes"] = [{"mesh": 0, "children": list(range(1, 8))}, *[{"mesh": 0}] * 7]
     with pytest.raises(InputError, match=r"bytes come to 24000000 vertices and 8000000 triangles"):
         load_mesh(write(builder))
+
+
+@pytest.mark.parametrize(
+    ("nodes", "primitives", "message"),
+    [
+        (100_001, 1, "nodes: there are 100001; at most 100000 are allowed"),
+        (101, 200, r"comes to 20200 parts \(meshes by node"),
+        (1, 20_001, r"comes to 20001 parts \(meshes by node"),
+    ],
+)
+def test_more_nodes_and_parts_than_are_drawn_are_refused_soon(
+    gltf: ModuleType, write: Write, nodes: int, primitives: int, message: str
+) -> None:
+    builder = gltf.plain()
+    builder.document["meshes"][0]["primitives"] *= primitives
+    builder.document["nodes"] = [{"mesh": 0}] * nodes
+    del builder.document["scenes"], builder.document["scene"]
+    with pytest.raises(InputError, match=message):
+        load_mesh(write(builder))
+
+
+def test_a_list_of_more_entries_than_any_model_has_is_refused(gltf: ModuleType, write: Write) -> None:
+    builder = gltf.plain()
+    builder.document["materials"] = [{}] * 200_001
+    with pytest.raises(InputError, match="materials: there are 200001; at most 200000 are allowed"):
+        load_mesh(write(builder))
+
+
+def test_a_file_that_is_a_buffer_often_is_counted_and_read_once(
+    gltf: ModuleType, write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    builder = gltf.plain()
+    names = []
+
+    def counted(path: Path, what: str) -> bytes:
+        names.append(path.name)
+        return read_local(path, what)
+
+    monkeypatch.setattr("aliasbench.scenes.gltf_buffers.read_local", counted)
+    (tmp_path / "used.bin").write_bytes(builder.data)
+    with (tmp_path / "large.bin").open("wb") as file:
+        file.truncate(600_000_000)
+    large = {"uri": "large.bin", "byteLength": 600_000_000}
+    buffers = [{"uri": "used.bin", "byteLength": len(builder.data)}] * 2 + [large] * 3
+    wanted = load_mesh(write(builder)).surfaces[0].vertices
+    for k, view in enumerate(builder.document["bufferViews"]):
+        view["buffer"] = k % 2
+    (tmp_path / "many.gltf").write_text(json.dumps({**builder.document, "buffers": buffers}))
+    np.testing.assert_array_equal(load_mesh(tmp_path / "many.gltf").surfaces[0].vertices, wanted)
+    assert names == ["used.bin"]
+    (tmp_path / "more.bin").hardlink_to(tmp_path / "large.bin")
+    more = [*buffers, {**large, "uri": "more.bin"}]
+    (tmp_path / "many.gltf").write_text(json.dumps({**builder.document, "buffers": more}))
+    with pytest.raises(InputError, match=r"buffers: come to 1200\d+ bytes; at most 1000000000 are allowed"):
+        load_mesh(tmp_path / "many.gltf")
+
+
+def test_keys_of_many_channels_are_read_once_and_counted(
+    gltf: ModuleType, write: Write, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    builder = gltf.plain()
+    times, values = builder.array(np.arange(100.0)), builder.array(np.arange(300.0).reshape(100, 3))
+    for node in range(50):
+        gltf.add_animation(builder, node, "translation", times, values)
+    builder.document["nodes"] = [{"mesh": 0, "children": list(range(1, 50))}, *[{"mesh": 0}] * 49]
+    monkeypatch.setattr("aliasbench.scenes.gltf_animation._MOST_KEYS", 200)
+    assert {s.motion.velocity for s in load_mesh(write(builder)).surfaces} == {(3, 3, 3), (6, 6, 6)}
+    for node in (0, 1):
+        gltf.add_animation(builder, node, "translation", builder.array(np.arange(100.0)), values)
+    with pytest.raises(InputError, match=r"animations\[0\]: has more than 200 keys; fewer are allowed"):
+        load_mesh(write(builder))
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("a.glb", "is no GLB file, and has 900000000 bytes; at most 64000000 of glTF JSON are allowed"),
+        ("a.gltf", "is no GLB file, and has 900000000 bytes"),
+        ("a.obj", r"is no OBJ text \(it has bytes of 0\)"),
+        ("a.ply", "has no PLY header"),
+    ],
+)
+def test_large_files_of_another_kind_are_refused_unread(
+    tmp_path: Path, name: str, message: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delattr("pathlib.Path.read_bytes")
+    with (tmp_path / name).open("wb") as file:
+        file.truncate(900_000_000)
+    with pytest.raises(InputError, match=message):
+        load_mesh(tmp_path / name)
+
+
+def test_what_is_neither_glb_nor_json_is_said_to_be_neither(tmp_path: Path) -> None:
+    (tmp_path / "a.glb").write_text("schema = 1\n")
+    with pytest.raises(InputError, match=r"a.glb: is neither GLB nor glTF JSON"):
+        load_mesh(tmp_path / "a.glb")
 
 
 def test_an_image_that_claims_to_be_huge_is_refused_unread(gltf: ModuleType, write: Write) -> None:

@@ -1,5 +1,6 @@
 """OBJ and PLY files become what they say, in every form they are written in; damaged ones are refused with the line."""
 
+import os
 import struct
 from pathlib import Path
 from typing import Any
@@ -94,11 +95,21 @@ def test_a_ply_is_what_trimesh_wrote(tmp_path: Path, encoding: str) -> None:
         (b"ply\nformat ascii 1.0\nend_header\n", "has no vertices with x, y and z"),
         (ply("<", [[0, 1, 2]])[:-30], "has not the"),
         (ply("<", [[0, 1, 2], [0, 1, 2, 3]])[:-9], "has not the 2 elements 'face' that its header says (cut off?)"),
-        (ply("", [[0, 1, 2]])[:-12], "has not the 1 elements 'face'"),
-        (ply("", [[0, 1, 2]]).replace(b"7 3", b"7 x"), "something other than numbers"),
+        (
+            ply("", [[0, 1, 2]])[:-12],
+            "a list 'vertex_indices' has a length of 3; the file has 2 more of its values (cut off?)",
+        ),
+        (ply("", [[0, 1, 2]]).replace(b"7 3", b"7 x"), "line 17: '7 x 0 1 2 "),
+        (ply("", [[0, 1, 2]]).replace(b"7 3", b"7 -3"), "element 'face': a list 'vertex_indices' has a length of -3"),
+        (ply("", [[0, 1, 2]]) + b"5 6\n", "has 2 numbers more than the elements of its header have"),
+        (
+            ply("", [[0, 1, 2]]).replace(b"element face", b"element vertex"),
+            "line 8: there is an element 'vertex' already",
+        ),
+        (ply("", [[0, 1, 2]]).replace(b"3 0 1 2", b"3 0 1 1.5"), "a face has the index 1.5; whole numbers from 0"),
         (ply("", [[0, 1, 2]]).replace(b"vertex 4", b"vertex 99999999"), "element vertex has a count of 99999999"),
         (ply("<", [[0, 1, 4]]), "index 4 has no vertex; there are 4 vertices"),
-        (ply("<", [[0, 1, -2]]), "index -1 has no vertex"),
+        (ply("<", [[0, 1, -2]]), "a face has the index -2; whole numbers from 0 are needed"),
         (ply("", [[0, 1, 2]]).replace(b"1 1 0", b"1 nan 0"), "mesh: vertex 2 is [1.0, nan, 0.0]; finite numbers"),
         (ply("<", [[0, 1, 1]]), "has no triangle with an area"),
         (ply("<", []), "has no triangle with an area"),
@@ -173,8 +184,9 @@ def test_an_obj_is_what_trimesh_reads(tmp_path: Path) -> None:
     ("text", "mtl", "message"),
     [
         ("", None, "has no vertices (lines 'v x y z')"),
-        ("v 1 2\nf 1 1 1", None, "a line 'v' has 2 numbers; 3 or 4 or 6 are needed"),
-        ("v 1 2 x\nf 1 1 1", None, "lines 'v': has something other than numbers"),
+        ("v 1 2\nf 1 1 1", None, "line 1: 'v 1 2': v has 2 numbers; 3 or 4 or 6 are needed"),
+        ("v 1 2 3\n\nv 1 2 x\nf 1 1 1", None, "line 3: 'v 1 2 x': has something other than numbers"),
+        ("v 1 2 3\nf \\\n1 1\\\n1\nf 9 9 9", None, "line 5: there is no vertex 9"),
         (OBJ.format("1/1 2/2"), None, "line 13: a face of 2 corners; 3 at least are needed"),
         (OBJ.format("1/1 2/2 9/3"), None, "line 13: there is no vertex 9; there are 4"),
         (OBJ.format("1/1 2/2 0/3"), None, "line 13: there is no vertex 0"),
@@ -194,11 +206,18 @@ def test_an_obj_is_what_trimesh_reads(tmp_path: Path) -> None:
         (OBJ.format("1/1 2/2 3/3"), MTL.format("http://x.org/a.png"), "is no local file"),
         (OBJ.format("1/1 2/2 3/3"), MTL.format("C:\\\\a.png"), "is no local file"),
         (OBJ.format("1/1 2/2 3/3"), MTL.format("-s 2 2 a.ppm"), "map_Kd has options"),
-        (OBJ.format("1/1 2/2 3/3"), MTL.replace("0.5 1 1", "-1 0 0").format("a.ppm"), "Kd must be three numbers"),
+        (
+            OBJ.format("1/1 2/2 3/3"),
+            MTL.replace("0.5 1 1", "-1 0 0").format("a.ppm"),
+            "Kd -1 0 0 must be one number or three",
+        ),
+        (OBJ.format("1/1 2/2 3/3"), MTL.replace("0.5 1 1", "1 0").format("a.ppm"), "a.mtl: line 2: Kd 1 0 must be"),
+        (OBJ.format("1/1 2/2 3/3"), MTL.format("a" * 3000), "a.mtl: line 3: map_Kd: image 'aaa"),
+        (OBJ.format("1/1 2/2 3/3"), "\v\u2028\x85\n" + MTL.format("-s a.ppm"), "a.mtl: line 4: map_Kd has options"),
         (
             OBJ.format("1/1 2/2 3/3").replace("v 1 1 0", "v nan 1 0"),
             None,
-            "vertex 2 is [nan, 1.0, 0.0]; finite numbers",
+            "line 5: 'v nan 1 0': finite numbers up to 1e+12 are needed",
         ),
     ],
 )
@@ -288,3 +307,32 @@ def test_a_property_that_is_there_twice_is_refused(tmp_path: Path, line: str) ->
     (tmp_path / "a.ply").write_bytes(data)
     with pytest.raises(InputError, match=r"a.ply: line 6: element vertex has a property 'x' already"):
         load_mesh(tmp_path / "a.ply")
+
+
+def test_names_that_are_not_utf8_are_told_apart_and_printable(tmp_path: Path) -> None:
+    (tmp_path / "a.mtl").write_bytes(b"newmtl \xe9\nKd 1 0 0\nnewmtl \xe8\nKd 0 1 0\n")
+    lines = b"mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl \xe9\nf 1 2 3\nusemtl \xe8\nf 1/1 2/1 3/1\n"
+    (tmp_path / "a.obj").write_bytes(lines)
+    model = load_mesh(tmp_path / "a.obj")
+    assert [s.color for s in model.surfaces] == [(1, 0, 0), (0, 1, 0)]
+    with (tmp_path / "a.mtl").open("ab") as file:
+        file.write(b"map_Kd \xe8.ppm\n")
+    for reason in (r"no such file", r"cannot be read \(its path is not UTF-8\)"):
+        with pytest.raises(InputError, match=rf"line 5: map_Kd: image '\\udce8.ppm': {reason}"):
+            load_mesh(tmp_path / "a.obj")
+        Path(os.fsdecode(bytes(tmp_path) + b"/\xe8.ppm")).write_bytes(PPM)
+    (tmp_path / "a.obj").write_bytes(lines.replace(b"usemtl \xe9", b"usemtl \xea"))
+    with pytest.raises(InputError, match="unknown material") as caught:
+        load_mesh(tmp_path / "a.obj")
+    assert str(caught.value).isprintable()
+
+
+def test_parts_of_many_materials_have_only_their_vertices(tmp_path: Path) -> None:
+    points = "".join(f"v {k} {k * k} {k % 3}\n" for k in range(3000))
+    (tmp_path / "a.obj").write_text(points + "".join(f"usemtl m{k}\nf {k} {k + 1} {k + 2}\n" for k in range(1, 2000)))
+    (surface,) = load_mesh(tmp_path / "a.obj").surfaces
+    k = np.arange(1999)[:, None] + np.arange(3)
+    np.testing.assert_array_equal(surface.vertices[surface.triangles], np.stack([k, k**2, k % 3], axis=-1))
+    (tmp_path / "a.obj").write_text("v 0 0 0\n" + "".join(f"usemtl m{k}\nf 1 1 1\n" for k in range(20_001)))
+    with pytest.raises(InputError, match="comes to 20001 parts"):
+        load_mesh(tmp_path / "a.obj")
