@@ -7,9 +7,10 @@ that the others are no slower. Only where numbers cannot be read are lines looke
 Free-form curves, lines and points are left out. Source: Wavefront, Object Files (.obj), version 3.0.
 """
 
+import io
 import re
 from array import array
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NoReturn
@@ -54,14 +55,22 @@ def read_obj(
     InputError
         If a line cannot be read, an index has no vertex, or a material or a texture is missing or not beside the file.
     """
-    lines = _joined(data.splitlines()) if b"\\" in data else data.splitlines()
     try:
-        return _read_lines(lines, len(data), path, label, retextured)
+        return _read_lines(data, len(data), path, label, retextured)
     except InputError:
-        bare = [line.split(b"#", 1)[0] if _COMMENTED.match(line) else line for line in lines]
-        if bare == lines:
+        bare = b"\n".join(line.split(b"#", 1)[0] if _COMMENTED.match(line) else line for line in _lines_of(data))
+        if bare.count(b"#") == data.count(b"#"):
             raise
     return _read_lines(bare, len(data), path, label, retextured)
+
+
+def _lines_of(data: bytes) -> Iterator[bytes]:
+    """Return a file's lines one by one: all of them together take several times the memory of the file."""
+    if b"\\" in data:
+        return iter(_joined(data.splitlines()))
+    if b"\n" not in data:
+        return iter(data.splitlines())
+    return (line.rstrip(b"\r\n") for line in io.BytesIO(data))
 
 
 def _joined(lines: list[bytes]) -> list[bytes]:
@@ -78,14 +87,14 @@ def _joined(lines: list[bytes]) -> list[bytes]:
 
 
 def _read_lines(
-    lines: Sequence[bytes], size: int, path: Path, label: str, retextured: bool
+    data: bytes, size: int, path: Path, label: str, retextured: bool
 ) -> tuple[list[Part], dict[str, ImageTexture]]:
     file = str(path)
     points, coordinates = list[bytes](), list[bytes]()
     groups: dict[str, _Faces] = {"": _Faces()}
     libraries = list[str]()
     current = groups[""]
-    for number, line in enumerate(lines, 1):
+    for number, line in enumerate(_lines_of(data), 1):
         words = line.split(None, 1)
         if len(words) < 2:
             continue
@@ -107,9 +116,11 @@ def _read_lines(
             libraries.append(decoded(rest))
     if not points:
         raise InputError(f"{file}: has no vertices (lines 'v x y z'); an OBJ mesh needs them")
-    values = _read_columns(points, lines, file, "v", (3, 4, 6))
+    values = _read_columns(points, data, file, "v", (3, 4, 6))
+    points.clear()
     positions, colors = values[:, :3], np.maximum(values[:, 3:], 0.0) if values.shape[1] == 6 else None
-    uv = _read_columns(coordinates, lines, file, "vt", (1, 2, 3)) if coordinates else None
+    uv = _read_columns(coordinates, data, file, "vt", (1, 2, 3)) if coordinates else None
+    coordinates.clear()
     if uv is not None and uv.shape[1] == 1:
         uv = np.concatenate([uv, np.zeros_like(uv)], axis=1)
     triangles = sum(len(g.corners) - 2 * len(g.counts) for g in groups.values())
@@ -119,9 +130,10 @@ def _read_lines(
     check_amount(file, vertices, triangles, size, colored=0 if colors is None else triangles, parts=drawn)
     materials = read_materials(libraries, path)
     textures: dict[str, ImageTexture] = {}
-    names: dict[Path, str] = {}
+    wanted: dict[Path, Material] = {}
     parts = []
-    for name, faces in groups.items():
+    for name in list(groups):
+        faces = groups.pop(name)
         if not faces.counts:
             continue
         if name and libraries and name not in materials:
@@ -130,17 +142,18 @@ def _read_lines(
         texture = None
         if material.image is not None and not retextured:
             image = path_beside(path.parent, material.image, f"{material.image_place}: map_Kd", escaped=False)
-            if image not in names:
-                names[image] = _add_texture(image, material, path, label, textures)
-            texture = names[image]
+            wanted.setdefault(image, material)
+            texture = _texture_name(image, path, label)
         parts.append(_build_part(faces, positions, colors, None if uv is None else uv[:, :2], material, texture, file))
+        del faces
+    # Last, when the texts of the faces are gone: both at once would be the most memory.
+    for image, material in wanted.items():
+        textures[_texture_name(image, path, label)] = _load_texture(image, material, textures)
     return parts, textures
 
 
-def _read_columns(
-    own: Sequence[bytes], lines: Sequence[bytes], file: str, kind: str, widths: Sequence[int]
-) -> FloatArray:
-    """Return the numbers of a file's `lines` of one kind, of which those without the kind are `own`, as (n, width)."""
+def _read_columns(own: Sequence[bytes], data: bytes, file: str, kind: str, widths: Sequence[int]) -> FloatArray:
+    """Return the numbers of a file's lines of one kind, which are `own` without the kind, as (n, width)."""
     counts = [len(line.split()) for line in own]
     least = min(counts)
     width = max((w for w in widths if w <= least), default=0)
@@ -151,17 +164,17 @@ def _read_columns(
             text = b" ".join(b" ".join(line.split()[:width]) for line in own)
             numbers = parse_numbers(text, f"{file}: lines {kind!r}")
     except InputError:
-        _refuse_line(lines, file, kind, widths)
+        _refuse_line(data, file, kind, widths)
         raise
     # Not (x > limit), so that a NaN is caught by the one comparison.
     if width == 0 or not (np.abs(numbers.reshape(len(own), width)[:, :3]) <= LENGTH).all():
-        _refuse_line(lines, file, kind, widths)
+        _refuse_line(data, file, kind, widths)
     return numbers.reshape(len(own), width)
 
 
-def _refuse_line(lines: Sequence[bytes], file: str, kind: str, widths: Sequence[int]) -> None:
+def _refuse_line(data: bytes, file: str, kind: str, widths: Sequence[int]) -> None:
     """Raise `InputError` at the first line of a kind that has not the numbers it needs."""
-    for number, line in enumerate(lines, 1):
+    for number, line in enumerate(_lines_of(data), 1):
         words = line.split()
         if words[:1] != [kind.encode()]:
             continue
@@ -258,16 +271,17 @@ def _resolve(
     return out
 
 
-def _add_texture(image: Path, material: Material, path: Path, label: str, textures: dict[str, ImageTexture]) -> str:
-    """Add the texture of an image file to `textures` and return its name, in which the image's path is."""
-    name = printable(f"{label}#{image.relative_to(path.parent.resolve()).as_posix()}")
-    used = sum(t.texels.size // 4 for t in textures.values())
+def _texture_name(image: Path, path: Path, label: str) -> str:
+    return printable(f"{label}#{image.relative_to(path.parent.resolve()).as_posix()}")
+
+
+def _load_texture(image: Path, material: Material, others: Mapping[str, ImageTexture]) -> ImageTexture:
+    used = sum(t.texels.size // 4 for t in others.values())
     what = f"{material.image_place}: map_Kd: image {shortened(ascii(image.name))}"
     try:
         size = image.stat().st_size if is_local(image) else 0
         most = max(_FREE_TEXELS, _TEXELS_PER_BYTE * size) - used
         source = printable(material.image or "")
-        textures[name] = load_image(image, source=source, label=what, most_texels=max(0, most))
+        return load_image(image, source=source, label=what, most_texels=max(0, most))
     except OSError as error:
         raise InputError(f"{what}: cannot be read ({reason_of(error)})") from error
-    return name
