@@ -36,7 +36,7 @@ KERNEL_STYLES: Mapping[str, str] = {
 
 @dataclass(frozen=True, slots=True)
 class SignalFigure:
-    """One drawing: SVG text (safe to embed), whose samples are drawn, and a sentence on what it shows."""
+    """One drawing: SVG text (safe to embed; empty where there is none), whose samples, and a sentence on it."""
 
     svg: str
     caption: str
@@ -89,7 +89,8 @@ class Plot:
 def draw_records(group: Sequence[Record]) -> list[SignalFigure]:
     """Return the drawings of one scene's records: of each renderer the one with the fewest samples and a picture.
 
-    None of scenes that are no signals, that cannot be built here, or of which no picture was kept.
+    None of scenes that are no signals, that cannot be built here, or of which no picture was kept. Of pictures too
+    small to be drawn only a sentence.
     """
     if group[0].scene.partition(":")[0].strip() not in SCENES_DRAWN:
         return []
@@ -100,11 +101,14 @@ def draw_records(group: Sequence[Record]) -> list[SignalFigure]:
             continue
         chosen = min(kept, key=lambda r: r.samples or 0)
         try:
-            figure = draw_signals(load_scene(chosen.scene), read_image(chosen.folder / chosen.images["frame"]))
+            pixels = read_image(chosen.folder / chosen.images["frame"])
+            figure = draw_signals(load_scene(chosen.scene), pixels)
         except InputError:
             continue
-        if figure is not None:
-            drawn.append(replace(figure, technique=chosen.technique))
+        if figure is None:
+            height, width = pixels.shape[:2]
+            figure = SignalFigure("", f"No drawing: {width} x {height} pixels are too few for rows of one wave each.")
+        drawn.append(replace(figure, technique=chosen.technique))
     return drawn
 
 
@@ -121,12 +125,14 @@ def draw_signals(scene: Scene, pixels: NDArray[np.floating]) -> SignalFigure | N
     Returns
     -------
     SignalFigure or None
-        None where the picture is too narrow or the scene's rows are not known.
+        None where the picture is too small or the scene's rows are not known.
     """
     if pixels.shape[1] < 4 * MARGIN:
         return None
     try:
         points = measure_rates(scene, pixels)
+        if not points and len(scene.textures) > 1:
+            return None  # many waves, and no row that shows one of them alone
         return draw_rates(points) if len(points) > 1 else draw_row(scene, pixels)
     except UnsupportedScene:
         return None

@@ -121,3 +121,9 @@ def test_the_page_draws_the_fewest_samples_of_each_renderer(
     page = write_report([fabricate(records, pictures=pictures)], tmp_path / "out").read_text(encoding="utf-8")
     drawn = re.findall(r'<figure class="signal-figure">.*?<figcaption><b>(.*?)</b>', page, re.DOTALL)
     assert drawn == ["raytrace:", "raster:"] * 2
+
+
+def test_a_sweep_too_small_for_a_row_of_each_wave_is_not_drawn() -> None:
+    sweep = build_scene("nyquist-sweep")
+    assert draw_signals(sweep, np.zeros((128, 128, 3))) is None, "the middle of each row is a border of two bands"
+    assert draw_signals(build_scene("signals:profile=irregular"), np.zeros((128, 128, 3))) is not None
