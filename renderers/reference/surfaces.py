@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from aliasbench.renderers.reference.fragments import convex_area
 from aliasbench.renderers.reference.pieces import Pieces
 from aliasbench.renderers.reference.runs import BILINEAR, GRID, SINE
 from aliasbench.renderers.reference.texture_tables import TextureTable
@@ -23,6 +24,8 @@ _EPS = 2.0**-52
 _FACING = 1e-11  # relative change of 1 / depth over a piece that is none
 _ALIGNED = 1e-9  # texels by which a row may leave its direction, across the picture
 _STEEPEST = 1e3  # how much faster u may change across the rows than along them
+_SLIVER = 1e-12  # square pixels of a piece: seen edge-on but for rounding, which is all its texture is too
+_MOST_LOST = 1e-9  # of a pixel, by dividing rounding errors by how fast u changes along a row
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -95,6 +98,14 @@ def build_surfaces(
         q = homogeneous @ pieces.planes[index, 3]
         if kind < 0 or not (q > 0.0).all():
             continue
+        scale = float(np.abs(colors[owner]).max())
+        area = convex_area(points, len(points))
+        if area <= _SLIVER:
+            brightest = max(
+                1.0, float(np.abs(table.row_texels).max(initial=1.0)), float(np.abs(table.params[owner, :6]).max())
+            )
+            bound = max(bound, area * scale * brightest)
+            continue
         rows = np.concatenate([table.maps[owner] @ pieces.planes[index, 1:], pieces.planes[index, 3:]])
         if kind == BILINEAR:
             rows[:2] -= 0.5 * rows[2]
@@ -106,15 +117,19 @@ def build_surfaces(
             wander = 0.0
         reach = (np.abs(homogeneous) @ np.abs(rows[:2]).T / q[:, None]).max(axis=0)
         reach += uv_reach[owner] * np.abs(table.maps[owner][:, :2]).sum(axis=1)
-        off = (_rounding(pieces.planes[index, 0], view, far) + wander) * float(reach.sum())
+        relative = _rounding(pieces.planes[index, 0], view, far) + wander
+        leaves = _settle(rows, homogeneous, relative * reach, squares=kind == GRID)
+        off = float((relative * reach).sum()) + leaves
         values = table.params[owner, :6].reshape(2, 3)
-        scale = float(np.abs(colors[owner]).max())
+        lost = 0.0
         if kind in (GRID, BILINEAR):
+            if kind == GRID:
+                off = _moved_borders(rows, homogeneous, relative * reach) + leaves
             choice = _choose_rows(rows, points, q, kind == BILINEAR)
             out.ways[index], rows, out.along[index] = choice.way, choice.rows, choice.along
             h, w, first = out.blocks[index] = table.blocks[owner, int(choice.swapped)]
             values = table.row_texels[first : first + h * (w + 1)]
-            off = (1.0 + choice.steep) * off + choice.leaves
+            off, lost = (1.0 + choice.steep) * off + choice.leaves, choice.lost
             if choice.way in (CLIP, CLIP_BLEND):
                 tiles += _count_tiles(rows, homogeneous)
         elif kind == SINE:
@@ -124,13 +139,18 @@ def build_surfaces(
             out.ways[index] = PLATE
             off *= 2.0 * abs(table.params[owner, 6]) * float(reach.max())
         out.own[index], out.params[index] = rows, table.params[owner]
+        # nothing is off by more than all there is of a piece in a pixel
+        off = min(off, area, 1.0) + lost
         bound = max(bound, scale * float(np.ptp(values, axis=0).max()) * off)
     return replace(out, texels=table.row_texels, sums=table.row_sums, bound=bound, tiles=tiles)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Choice:
-    """Rows of a texture in the picture: `steep` and `leaves` enter the bound, see `_STEEPEST` and `_ALIGNED`."""
+    """Rows of a texture in the picture.
+
+    `steep`, `leaves` and `lost` enter the bound, see `_STEEPEST`, `_ALIGNED` and `_MOST_LOST`.
+    """
 
     way: int
     rows: FloatArray
@@ -138,6 +158,7 @@ class _Choice:
     swapped: bool
     steep: float
     leaves: float
+    lost: float = 0.0
 
 
 def _choose_rows(rows: FloatArray, points: FloatArray, q: FloatArray, blend: bool) -> _Choice:
@@ -155,8 +176,10 @@ def _choose_rows(rows: FloatArray, points: FloatArray, q: FloatArray, blend: boo
         homogeneous = np.c_[points, np.ones(len(points))]
         values = homogeneous @ own[:2].T / q[:, None]
         fastest = float(np.abs(own[None, 0, :2] - values[:, :1] * own[None, 2, :2]).max())
-        if leaves <= _ALIGNED and slope * _STEEPEST > fastest:
-            return _Choice(WALK_BLEND if blend else WALK, own, along, swapped, fastest / slope, leaves)
+        size = float((np.abs(homogeneous) @ np.abs(own[0])).max())
+        if leaves <= _ALIGNED and slope * _STEEPEST > fastest and 4.0 * _EPS * size <= _MOST_LOST * slope:
+            lost = 4.0 * _EPS * size / slope
+            return _Choice(WALK_BLEND if blend else WALK, own, along, swapped, fastest / slope, leaves, lost)
         if swapped is False and slope <= 1e-12 * fastest and not own[1].any():
             # a wave whose crests run along the horizon: its rows are the crests, and what counts texels along them is
             # of no matter, there is only one
@@ -164,6 +187,49 @@ def _choose_rows(rows: FloatArray, points: FloatArray, q: FloatArray, blend: boo
             leaves = slope * span / least
             return _Choice(WALK, crests, along, True, 1.0, leaves)
     return _Choice(CLIP_BLEND if blend else CLIP, rows, np.array([1.0, 0.0]), False, 0.0, 0.0)
+
+
+def _settle(rows: FloatArray, homogeneous: FloatArray, errors: FloatArray, *, squares: bool) -> float:
+    """Make u and v constant in `rows` where they change by rounding only; return by how much they did.
+
+    Such a change has no direction, and dividing by it gives anything. Squares are constant within a texel, so its
+    middle stands for all of it: what lies on a border to the last bit belongs to the texel that begins there.
+    """
+    q = homogeneous @ rows[2]
+    most = 0.0
+    for c in range(2):
+        if not rows[c].any():
+            continue  # a texture without this coordinate
+        values = homogeneous @ rows[c] / q
+        change = float(np.ptp(values))
+        if change > 4.0 * float(errors[c]):
+            continue
+        value = float(values.mean())
+        if squares:
+            value = float(np.floor(value + errors[c])) + 0.5
+        else:
+            most += change
+        rows[c] = value * rows[2]
+    return most
+
+
+def _moved_borders(rows: FloatArray, homogeneous: FloatArray, errors: FloatArray) -> float:
+    """Return which share of a pixel changes its square where u and v are off by `errors`, summed over both.
+
+    A border that is off by d texels moves by d over how many texels there are to a pixel. Where there are many, so are
+    the borders, and it comes to d. Rounding is largest where a piece is farthest, and its texels densest.
+    """
+    q = homogeneous @ rows[2]
+    total = 0.0
+    for c in range(2):
+        values = homogeneous @ rows[c] / q
+        low, high = float(values.min()) - errors[c], float(values.max()) + errors[c]
+        if np.floor(low) == np.floor(high) or not rows[c].any():
+            continue
+        slopes = np.hypot(*(rows[c, None, :2] - values[:, None] * rows[2, None, :2]).T) / q
+        densest = float(slopes.max())
+        total += float(errors[c]) / min(1.0, densest) if densest > 0.0 else 1.0
+    return min(total, 1.0)
 
 
 def _rounding(nearness: FloatArray, view: View, far: float) -> float:

@@ -10,7 +10,7 @@ from aliasbench.renderers.reference import reference
 from aliasbench.renderers.reference.constant_uv import paint_constant
 from aliasbench.scenes.errors import UnsupportedScene
 from aliasbench.scenes.files import load_scene
-from aliasbench.scenes.model import Camera, Checker, ImageTexture, Motion, Scene, read_only
+from aliasbench.scenes.model import Camera, Checker, Grating, ImageTexture, Motion, Scene, read_only
 from aliasbench.scenes.shapes import mesh, polygon
 
 FLAT = Camera("orthographic", height=2.0)
@@ -135,3 +135,81 @@ def test_a_picture_that_cannot_be_is_refused(monkeypatch, wrong):
     )  # fmt: skip
     with pytest.raises(UnsupportedScene, match="edge-fan: rounding errors make its picture impossible"):
         render(load_scene("edge-fan"), "reference:", size=(4, 4))
+
+
+@pytest.fixture
+def striped_quad():
+    """Return a maker of a quad whose texture changes along one line of the picture only, but for noise."""
+
+    def make(texture, uv, projection="orthographic", noise=0.0):
+        corners = np.array([(-0.83, -0.71, 0.0), (0.77, -0.9, 0.0), (0.9, 0.68, 0.0), (-0.66, 0.93, 0.0)])
+        if projection == "perspective":
+            corners[:, 2] = -corners[:, 1]
+        turned = noise * corners[:, :2] @ [[0.3, 0.7], [-0.9, 0.4]]
+        given = polygon(corners, uv=uv(corners) + turned, texture="t")
+        camera = FLAT if projection == "orthographic" else Camera("perspective", fov_y_deg=30.0)
+        return Scene("stripes", camera, (given,), {"t": texture})
+
+    return make
+
+
+@pytest.mark.parametrize("truth", ["point", "linear"])
+@pytest.mark.parametrize("kind", ["box", "tent"])
+@pytest.mark.parametrize("projection", ["orthographic", "perspective"])
+@pytest.mark.parametrize("constant", [0, 1])
+@pytest.mark.parametrize("noise", [1e-16, 1e-13, 1e-10])
+def test_a_texture_coordinate_constant_up_to_rounding_is_as_good_as_constant(
+    striped_quad, truth, kind, projection, constant, noise
+):
+    texels = np.random.default_rng(3).uniform(0, 1, (3, 3, 4)).astype(np.float32)
+    texels[..., 3] = 1.0
+
+    def uv(corners):
+        out = np.full((4, 2), 0.4)
+        out[:, 1 - constant] = 0.7 * corners[:, 1] + 0.3 * corners[:, 0]
+        return out
+
+    image = ImageTexture(read_only(texels))
+    exact, noisy = (
+        render(striped_quad(image, uv, projection, n), f"reference:texture={truth},filter={kind}", size=(9, 8))
+        for n in (0.0, noise)
+    )
+    assert max(exact.uncertainty, noisy.uncertainty) < 1e-7
+    # texels' borders and values move by some times the noise
+    np.testing.assert_allclose(noisy.pixels, exact.pixels, atol=20 * noise + exact.uncertainty + noisy.uncertainty)
+
+
+def test_a_texture_coordinate_of_zero_leaves_nothing_to_doubt(striped_quad):
+    image = ImageTexture(read_only(np.random.default_rng(3).uniform(0, 1, (3, 3, 4)).astype(np.float32)))
+    scene = striped_quad(image, lambda corners: corners[:, :2] * [1.5, 0.0])
+    assert render(scene, "reference:", size=(9, 8)).uncertainty < 1e-10
+
+
+def test_a_grating_across_its_own_waves_is_flat():
+    # s = u cos 30 + v sin 30 is the same at all corners, but for the last bits
+    s = np.sqrt(3)
+    grating = Grating(4.0, 30.0, 0.5, "square", (0.25, 0.5, 0.0), (0.5, 1.0, 0.25))
+    corners = [(-0.83, -0.71, 0), (0.77, -0.9, 0), (0.1, 0.68, 0)]
+    uv = [(0.5, 0.5 + 0.61 * s), (1.5, 0.5 - 0.39 * s), (0.75, 0.5 + 0.36 * s)]
+    waves = Scene("w", FLAT, (polygon(corners, uv=uv, texture="t"),), {"t": grating})
+    value = np.cos(2 * np.pi * (4.0 * (0.5 * s / 2 + (0.5 + 0.61 * s) / 2) + 0.5))
+    flat = Scene("f", FLAT, (polygon(corners, color=(0.5, 1.0, 0.25) if value > 0 else (0.25, 0.5, 0.0)),))
+    shown, plain = (render(scene, "reference:", size=(8, 8)) for scene in (waves, flat))
+    assert shown.uncertainty < 1e-9
+    np.testing.assert_allclose(shown.pixels, plain.pixels, atol=1e-12)
+
+
+def test_a_textured_face_seen_edge_on_but_for_rounding_leaves_the_bound_small():
+    texels = np.random.default_rng(3).uniform(0, 1, (2, 3, 4)).astype(np.float32)
+    texels[..., 3] = 1.0
+    camera = Camera("orthographic", position=(3.0, 0.0, 3.0), height=2.0)
+    corners = [(-0.5, -0.7, -0.5), (0.3, -0.6, 0.3), (0.7, 0.9, 0.7 + 1e-15), (-0.4, 0.6, -0.4)]
+    wall = polygon(corners, uv=[(0, 0), (3, 0), (3, 2), (0, 2)], texture="t")
+    empty = Scene("e", camera, (), background=(0.2, 0.4, 0.6))
+    shown = render(
+        dataclasses.replace(empty, objects=(wall,), textures={"t": ImageTexture(read_only(texels))}),
+        "reference:filter=tent,texture=linear", size=(8, 8),
+    )  # fmt: skip
+    assert shown.uncertainty_kind == "bound"
+    assert shown.uncertainty < 1e-7
+    np.testing.assert_allclose(shown.pixels, np.broadcast_to((0.2, 0.4, 0.6), (8, 8, 3)), atol=1e-10)
