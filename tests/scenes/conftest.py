@@ -21,15 +21,26 @@ def scene_file(tmp_path: Path) -> Callable[[str], str]:
     return write
 
 
-@pytest.fixture(scope="session")
-def gltf() -> ModuleType:
-    """The module beside this file that makes glTF documents."""
-    spec = importlib.util.spec_from_file_location("gltf_builder", Path(__file__).with_name("gltf_builder.py"))
+def module_beside(name: str) -> ModuleType:
+    """Return the module of a script in this folder, which is no package."""
+    spec = importlib.util.spec_from_file_location(name, Path(__file__).with_name(f"{name}.py"))
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
+
+
+@pytest.fixture(scope="session")
+def gltf() -> ModuleType:
+    """What makes glTF documents."""
+    return module_beside("gltf_builder")
+
+
+@pytest.fixture(scope="session")
+def fuzz() -> ModuleType:
+    """The campaign of damaged model files."""
+    return module_beside("fuzz_meshes")
 
 
 @pytest.fixture

@@ -1,6 +1,5 @@
 """Damaged model files load or are refused in one sentence, soon; a sample of the campaign in `fuzz_meshes`."""
 
-import importlib.util
 import time
 from pathlib import Path
 from types import ModuleType
@@ -11,17 +10,6 @@ from aliasbench.scenes.errors import InputError
 from aliasbench.scenes.files import load_scene
 
 FILES = 240
-
-
-@pytest.fixture(scope="module")
-def fuzz() -> ModuleType:
-    """The campaign's module, which is a script beside this file."""
-    spec = importlib.util.spec_from_file_location("fuzz_meshes", Path(__file__).with_name("fuzz_meshes.py"))
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 def test_the_undamaged_files_load(fuzz: ModuleType, tmp_path: Path) -> None:
