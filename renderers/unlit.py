@@ -11,6 +11,8 @@ def check_unlit(renderer: str, scene: Scene) -> None:
         raise UnsupportedScene(f"{renderer}: {lens} is not drawn; a pinhole is")
     if scene.lights:
         raise UnsupportedScene(f"{renderer}: lights ({len(scene.lights)}) are not drawn; scenes without lights are")
+    if scene.bounces:
+        raise UnsupportedScene(f"{renderer}: diffuse interreflection (bounces = {scene.bounces}) is not drawn")
     for index, surface in enumerate(scene.objects):
         if surface.material.kind not in ("unlit", "diffuse"):
             raise UnsupportedScene(

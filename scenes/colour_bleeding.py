@@ -6,7 +6,7 @@ that direct light leaves black. Look at the block's shaded sides and its shadow,
 
 The room is open to the viewer and to the sky, which is black, so that nothing but the lamp gives light. `reflectance`
 is the share that white and the walls' own colours give back: the share of light that bounces k times goes as its k-th
-power. A renderer of direct light alone draws the same room with black shadows and without any tint; with
+power. One bounce is drawn; with `bounces=0`, direct light alone, the same room has black shadows and no tint, and with
 `reflectance=0` nothing but the lamp is seen. All stands still, and no facts are declared.
 """
 
@@ -30,7 +30,7 @@ BLOCK_MIDDLE: Vec3 = (0.25, 0.0, -0.15)
 BLOCK_HALF, BLOCK_HEIGHT = 0.3, 0.65
 
 
-def build_colour_bleeding(*, name: str, light_size: float, reflectance: float) -> Scene:
+def build_colour_bleeding(*, name: str, light_size: float, reflectance: float, bounces: int) -> Scene:
     """Return the room with a lamp of side `light_size` and walls that give back `reflectance` of their colours."""
     h, top = HALF, 2 * HALF
     sides: list[tuple[str, Vec3, list[Vec3]]] = [
@@ -45,6 +45,7 @@ def build_colour_bleeding(*, name: str, light_size: float, reflectance: float) -
         camera=Camera(projection="perspective", position=EYE, target=TARGET, fov_y_deg=FOV_Y_DEG),
         objects=tuple(_wall(side, color, corners, reflectance) for side, color, corners in sides),
         lights=(square_lamp(size=light_size, height=LAMP_HEIGHT, radiosity=BRIGHTNESS),),
+        bounces=bounces,
         animation=Animation(fps=float(FPS)),
     )
 
@@ -78,6 +79,7 @@ ENTRIES = (
         {
             "light_size": Parameter(0.6, 0.05, 1.5, "float", "side of the lamp, world units"),
             "reflectance": Parameter(0.8, 0.0, 0.95, "float", "share of light that white walls give back"),
+            "bounces": Parameter(1, 0, 1, "int", "0 leaves direct light alone, 1 adds light from one surface to another"),
         },
     ),
 )

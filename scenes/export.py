@@ -90,7 +90,7 @@ def _verify(scene: Scene, text: str, images: Mapping[str, bytes]) -> None:
 
 
 def _difference(one: Scene, other: Scene) -> str:
-    names = ("name", "camera", "lights", "background", "contrast", "animation", "facts")
+    names = ("name", "camera", "lights", "background", "contrast", "bounces", "animation", "facts")
     for name in names:
         if getattr(one, name) != getattr(other, name):
             return name
@@ -108,6 +108,7 @@ def _root(scene: Scene) -> list[str]:
         assignment("name", scene.name),
         assignment("background", scene.background),
         assignment("contrast", scene.contrast) + "  # white minus black, for the metrics",
+        *([assignment("bounces", scene.bounces)] if scene.bounces else []),
         "",
         "[animation]  # frame n is at n / fps; the shutter is open for this share of 1 / fps",
         assignment("fps", moving.fps),

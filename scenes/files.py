@@ -42,7 +42,10 @@ from aliasbench.scenes.schema import Table
 
 SCHEMA = 1
 NO_MEMORY = "needs more memory than there is"
-_ROOT = ("schema", "name", "background", "contrast", "animation", "camera", "object", "texture", "light", "fact")
+_ROOT = (
+    *("schema", "name", "background", "contrast", "bounces"),
+    *("animation", "camera", "object", "texture", "light", "fact"),
+)
 _PROJECTIONS = ("orthographic", "perspective")
 _CAMERA = (
     *("projection", "position", "target", "up", "height", "fov_y_deg"),
@@ -149,6 +152,7 @@ def read_root(root: Table, folder: Path, stem: str) -> Scene:
         ),
         background=root.color("background", (0.0, 0.0, 0.0)),
         contrast=root.number("contrast", 1.0, at_least=1 / RADIANCE, at_most=RADIANCE),
+        bounces=root.whole("bounces", 0, at_least=0, at_most=1),
         animation=animation,
         facts=problems.attempt(lambda: read_facts(root.table("fact"), checked, camera)) or Facts(),
     )

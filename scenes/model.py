@@ -262,7 +262,12 @@ class Facts:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
-    """Everything that is rendered. `contrast` is white minus black as declared, used by the metrics."""
+    """Everything that is rendered. `contrast` is white minus black as declared, used by the metrics.
+
+    `bounces` is how often light goes on from one diffuse surface to another: 0, direct light alone, or 1. Diffuse
+    surfaces then are lit by all that they see: unlit surfaces and the background as bright as they look, lights, and
+    each other by direct light.
+    """
 
     name: str
     camera: Camera
@@ -271,6 +276,7 @@ class Scene:
     lights: tuple[Light, ...] = ()
     background: Vec3 = (0.0, 0.0, 0.0)
     contrast: float = 1.0
+    bounces: int = 0
     animation: Animation = Animation()
     facts: Facts = Facts()
 

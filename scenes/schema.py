@@ -115,13 +115,13 @@ class Table:
             return _between_limits(default, max(above, at_least), min(below, at_most))
         return number
 
-    def whole(self, key: str, default: int | None = None, *, at_least: int) -> int:
-        """Return a whole number (written as one) of at least `at_least`."""
+    def whole(self, key: str, default: int | None = None, *, at_least: int, at_most: int = 2**31 - 1) -> int:
+        """Return a whole number (written as one) of at least `at_least`, at most `at_most`."""
         if default is not None and key not in self.values:
             return default
         value = self.values.get(key)
-        if not isinstance(value, int) or isinstance(value, bool) or not at_least <= value < 2**31:
-            self.report(key, f"a whole number, {at_least} or more")
+        if not isinstance(value, int) or isinstance(value, bool) or not at_least <= value <= at_most:
+            self.report(key, f"a whole number, {at_least} {'or more' if at_most == 2**31 - 1 else f'to {at_most}'}")
             return at_least if default is None else default
         return value
 

@@ -40,7 +40,7 @@ from aliasbench.renderers.raytrace.lanes import (
     TIME,
 )
 from aliasbench.renderers.raytrace.trig import cos_turns, sin_turns
-from aliasbench.scenes.model import FloatArray, Scene
+from aliasbench.scenes.model import Animation, FloatArray, Motion, Scene
 from aliasbench.scenes.motion import object_matrix, spin_turns
 from aliasbench.scenes.projection import View
 
@@ -53,7 +53,9 @@ RIGID, LINEAR = 0.0, 1.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Shutter:
-    """One exposure: the views at its opening and closing, and the fractions of the frame interval where they are."""
+    """One exposure: the views at its opening and closing, the fractions of the frame interval where they are, and how
+    objects move between.
+    """
 
     frame: int
     opening: float
@@ -61,6 +63,19 @@ class Shutter:
     first: View
     last: View
     layer_depth: float
+    lens_radius: float = 0.0
+    interpolated: bool = False
+
+    def place(self, motion: Motion, animation: Animation, fraction: float) -> FloatArray:
+        """Return the (4, 4) matrix of an object at a fraction of the frame interval.
+
+        `interpolated` is the lecture's motion: between its matrices at the begin and the end of the frame interval,
+        linearly.
+        """
+        if not self.interpolated:
+            return object_matrix(motion, animation, self.frame, fraction)
+        begin, end = (object_matrix(motion, animation, self.frame, f) for f in (0.0, 1.0))
+        return (1.0 - fraction) * begin + fraction * end
 
 
 def layer_matrix(view: View, layer: int, layer_depth: float, anchor: FloatArray) -> FloatArray:
@@ -84,11 +99,11 @@ def body_values(scene: Scene, body: Body, shutter: Shutter, anchor: FloatArray) 
     motion, animation = body.motion, scene.animation
     ends = [
         layer_matrix(view, body.layer, shutter.layer_depth, anchor)
-        @ body.local_matrix(object_matrix(motion, animation, shutter.frame, fraction), anchor)
+        @ body.local_matrix(shutter.place(motion, animation, fraction), anchor)
         for view, fraction in ((shutter.first, shutter.opening), (shutter.last, shutter.closing))
     ]
     out[INVERSE_SCALE] = 1.0
-    if motion.spin is not None:
+    if motion.spin is not None and not shutter.interpolated:
         pivot = np.asarray(motion.spin.center, dtype=np.float64)
         pivot_ends = [m[:3, :3] @ (pivot - body.origin) + m[:3, 3] for m in ends]
         axis = np.asarray(motion.spin.axis, dtype=np.float64)
@@ -121,10 +136,12 @@ def _image_bounds(
     """
     everywhere = (-np.inf, np.inf, -np.inf, np.inf)
     views = (shutter.first, shutter.last)
+    if shutter.lens_radius > 0.0:
+        return everywhere  # a lens sees it elsewhere
     if not np.array_equal(views[0].forward, views[1].forward) or not len(body.vertices):
         return everywhere
     low, high = body.vertices.min(axis=0), body.vertices.max(axis=0)
-    if body.motion.spin is not None:
+    if values[KIND] == RIGID:
         radius = float(np.linalg.norm(body.vertices + values[PIVOT : PIVOT + 3], axis=1).max())
         signs = np.stack(np.meshgrid(*[(-radius, radius)] * 3), axis=-1).reshape(8, 3)
         places = [values[SHIFT : SHIFT + 3] + share * values[SHIFT_TRAVEL : SHIFT_TRAVEL + 3] for share in (0.0, 1.0)]
@@ -236,11 +253,11 @@ def fill_body_rays(scratch: FloatArray, ray: NDArray[np.float32], body_ray: NDAr
 
 
 @njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
-def may_see(values: FloatArray, left: int, right: int, row: int) -> bool:
-    """Return whether pixels left..right of a row may see the body."""
+def may_see(values: FloatArray, left: float, right: float, top: float, bottom: float) -> bool:
+    """Return whether a rectangle of the picture may see the body."""
     return (
-        right + 1 >= values[BOUNDS]
+        right >= values[BOUNDS]
         and left <= values[BOUNDS + 1]
-        and row + 1 >= values[BOUNDS + 2]
-        and row <= values[BOUNDS + 3]
+        and bottom >= values[BOUNDS + 2]
+        and top <= values[BOUNDS + 3]
     )

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from aliasbench.renderers.raytrace.bodies import BODY_SIZE
 from aliasbench.renderers.raytrace.cutouts import is_hole, write_packet_alpha
 from aliasbench.renderers.raytrace.lanes import CAMERA_SIZE, RED, SCRATCH_SIZE
+from aliasbench.renderers.raytrace.paths import LIGHT_SIZE
 from aliasbench.renderers.raytrace.shading import TRIANGLE_SIZE, Tables
 from aliasbench.renderers.raytrace.texturing import CUTOFF, OBJECT_SIZE
 from aliasbench.scenes.model import FloatArray
@@ -78,7 +79,7 @@ def _pointer(typing_context: Any, address: Any) -> Any:  # noqa: ARG001 - numba 
 
 @njit(cache=True, forceinline=True, error_model="numpy")
 def _tables(words: AddressArray, camera: FloatArray) -> Tables:
-    """Return the tables that a context has the addresses of; the background is not among them."""
+    """Return the tables that a context has the addresses of; lights and background are not among them."""
     return Tables(
         carray(_pointer(words[_OBJECTS]), (words[_OBJECTS + 1], OBJECT_SIZE), np.float64),
         carray(_pointer(words[_OWNERS]), (words[_OWNERS + 1],), np.int32),
@@ -87,6 +88,7 @@ def _tables(words: AddressArray, camera: FloatArray) -> Tables:
         carray(_pointer(words[_FIRSTS]), (words[_FIRSTS + 1],), np.int64),
         carray(_pointer(words[_LEVELS]), (words[_LEVELS + 1], 3), np.int64),
         carray(_pointer(words[_TEXELS]), (words[_TEXELS + 1], 4), np.float32),
+        carray(_pointer(words[_OBJECTS]), (0, LIGHT_SIZE), np.float64),
         camera,
         words.view(np.float64)[_FOOTPRINT],
     )

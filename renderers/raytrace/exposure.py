@@ -54,7 +54,9 @@ def plan_exposure(
     last = view_at(scene.camera, scene.animation, frame, closing, size) if closing > opening else first
     anchor_frame = _anchor_frame(scene, frame)
     anchor = view_at(scene.camera, scene.animation, anchor_frame, 0.0, size).origin
-    shutter = Shutter(frame, opening, closing, first, last, _layer_depth(bodies, first))
+    depth = _layer_depth(bodies, first)
+    is_matrix = technique.motion == "matrix"
+    shutter = Shutter(frame, opening, closing, first, last, depth, scene.camera.lens_radius, is_matrix)
     # A layer above others is brought towards the eye, and so moves with it.
     apart = [not b.motion.is_static or (b.layer > 0 and not scene.camera.is_static) for b in bodies]
     restless = [b for b, is_apart in zip(bodies, apart, strict=True) if is_apart]
@@ -72,7 +74,8 @@ def shutter_interval(scene: Scene, technique: Technique) -> tuple[float, float]:
     One sample at a fixed place in its stratum is at the shutter's middle, and no other time need be modelled.
     """
     shutter = scene.animation.shutter
-    if technique.time == "center" or (technique.spp == 1 and technique.sampler in ("center", "grid")):
+    is_single = technique.adaptive == "off" and technique.spp == 1
+    if technique.time == "center" or (is_single and technique.sampler in ("center", "grid")):
         return shutter / 2, shutter / 2
     return 0.0, shutter
 

@@ -1,93 +1,48 @@
-"""The fast engine: kernels that make 16 rays, have Embree trace them, and shade them, row after row on every thread.
+"""The fast engine: scenes in Embree, and the kernels that have it trace 16 rays at once, on every thread."""
 
-Three kernels: static flat, static textured, moving: what a scene does not need costs it nothing. Threads take rows from
-one shared counter, so none waits for another, and a pixel depends on nothing but its own samples: the picture is the
-same bit for bit on any number of threads.
-"""
-
+import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any, NamedTuple
 
-import llvmlite.binding
 import numpy as np
-from llvmlite import ir
-from numba import njit, types
-from numba.extending import intrinsic
 from numpy.typing import NDArray
 
-from aliasbench.renderers.raytrace.bodies import fill_body_rays, may_see, to_body
-from aliasbench.renderers.raytrace.embree import Device, TriangleScene, library_path, load_library
+from aliasbench.renderers.raytrace.embree import Device, TriangleScene
+from aliasbench.renderers.raytrace.film import Film
+from aliasbench.renderers.raytrace.kernels import (
+    Workspace,
+    film_moving,
+    film_static,
+    render_moving,
+    render_static_flat,
+    render_static_textured,
+)
 from aliasbench.renderers.raytrace.lanes import (
-    HIT_GEOM,
-    HIT_INSTANCE,
-    HIT_PRIM,
     LANES,
     RAY_ID,
     RAY_MASK,
     RAY_SIZE,
-    RAY_TFAR,
     SCRATCH_SIZE,
-    KeyArray,
-    Sampling,
-    add_samples,
     aligned_floats,
-    fill_columns,
-    fill_keys,
-    fill_moving_rays,
-    fill_positions,
-    fill_rays,
-    fill_times,
 )
-from aliasbench.renderers.raytrace.shading import MISS, Tables, shade_flat, shade_textured
+from aliasbench.renderers.raytrace.paths import Scattering, make_paths
+from aliasbench.renderers.raytrace.positions import KEY_ROWS, orders_size
+from aliasbench.renderers.raytrace.shading import Tables
 from aliasbench.renderers.raytrace.tables import Mesh
 from aliasbench.renderers.raytrace.texturing import CUTOFF
+from aliasbench.renderers.sampling.patterns import Pattern
 from aliasbench.scenes.model import FloatArray
 
-IntArray = NDArray[np.int32]
 Kernel = Callable[..., None]
-
-# TBB first, then Embree's own symbols, where compiled kernels (cached ones too) look for rtcIntersect16.
-load_library()
-llvmlite.binding.load_library_permanently(str(library_path()))
-
-# A ctypes pointer would do the same, but kernels with one cannot be cached.
-_intersect16 = types.ExternalFunction("rtcIntersect16", types.void(types.intp, types.intp, types.intp, types.intp))
+Progress = Callable[[float], None]
 
 _COHERENT = 1 << 16
 _ALL_FEATURES = -1
-_NOTHING = -1  # Embree's invalid id, as int32
+_REPORTS_S = 0.1  # between two reports of progress
 
 
-@intrinsic
-def _take_next(typing_context: Any, counter: Any) -> Any:  # noqa: ARG001 - numba passes it
-    """Return the int64 at the start of an array and raise it by one, in one step that no other thread can split."""
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        array = context.make_array(signature.args[0])(context, builder, arguments[0])
-        return builder.atomic_rmw("add", array.data, ir.Constant(ir.IntType(64), 1), "monotonic")
-
-    return types.int64(counter), generate
-
-
-class Workspace(NamedTuple):
-    """One thread's memory, aligned as Embree needs it; `holes` only keeps alive what `arguments` point to."""
-
-    scratch: FloatArray
-    ray: NDArray[np.float32]
-    ray_ids: IntArray
-    body_ray: NDArray[np.float32]
-    body_ids: IntArray
-    valid: IntArray
-    arguments: IntArray
-    hits: IntArray
-    sums: FloatArray
-    keys: KeyArray
-    holes: NDArray[np.int64]
-
-
-def make_workspace(width: int) -> Workspace:
-    """Return memory for one thread that renders rows of `width` pixels."""
+def make_workspace(width: int, pattern: Pattern, margin: int) -> Workspace:
+    """Return memory for one thread that renders rows of `width` pixels under a filter that reaches `margin` more."""
     ray, body_ray = aligned_floats(RAY_SIZE), aligned_floats(RAY_SIZE)
     valid, arguments = aligned_floats(LANES).view(np.int32), aligned_floats(LANES).view(np.int32)
     # RTCIntersectArguments: flags, feature mask, then pointers and a float that stay null.
@@ -95,6 +50,7 @@ def make_workspace(width: int) -> Workspace:
     for ids in (ray.view(np.int32), body_ray.view(np.int32)):
         ids[RAY_MASK : RAY_MASK + LANES] = -1
         ids[RAY_ID : RAY_ID + LANES] = np.arange(LANES)
+    taps = 2 * margin + 1
     return Workspace(
         np.zeros(SCRATCH_SIZE),
         ray,
@@ -105,133 +61,15 @@ def make_workspace(width: int) -> Workspace:
         arguments,
         np.zeros(LANES, np.int32),
         np.zeros(3),
-        np.zeros((4, width), np.uint64),
+        np.zeros((KEY_ROWS, width), np.uint64),
+        np.zeros((3, orders_size(pattern)), np.int32),
+        np.zeros(LANES, np.int64),
+        np.zeros((LANES, 4), np.int64),
+        np.zeros(2, np.int64),
+        np.zeros((2, taps, LANES)),
+        np.zeros((taps, taps, 4)),
         np.zeros(0, np.int64),
     )
-
-
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
-def _trace(scene: int, work: Workspace, lanes: int) -> None:
-    """Find the nearest hits on the mesh that stands still, MISS where there is none."""
-    for i in range(LANES):
-        work.ray[RAY_TFAR + i] = np.inf
-        work.ray_ids[HIT_GEOM + i] = _NOTHING
-        work.ray_ids[HIT_INSTANCE + i] = _NOTHING
-        work.ray_ids[HIT_PRIM + i] = MISS
-    for i in range(LANES):
-        work.valid[i] = -1 if i < lanes else 0
-    _intersect16(work.valid.ctypes.data, scene, work.ray.ctypes.data, work.arguments.ctypes.data)
-    for i in range(LANES):
-        work.hits[i] = work.ray_ids[HIT_PRIM + i]
-
-
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
-def _trace_bodies(scenes: NDArray[np.int64], tables: Tables, work: Workspace, row: int, left: int, right: int) -> None:
-    """Find nearer hits on the bodies that move, each in its own frame."""
-    for body in range(len(scenes)):
-        if not may_see(tables.bodies[body], left, right, row):
-            continue
-        to_body(tables.bodies[body], work.scratch)
-        fill_body_rays(work.scratch, work.ray, work.body_ray)
-        for i in range(LANES):
-            work.body_ids[HIT_GEOM + i] = _NOTHING
-            work.body_ids[HIT_INSTANCE + i] = _NOTHING
-        _intersect16(work.valid.ctypes.data, scenes[body], work.body_ray.ctypes.data, work.arguments.ctypes.data)
-        first = np.int32(tables.firsts[body])
-        for i in range(LANES):
-            if work.body_ids[HIT_GEOM + i] != _NOTHING:
-                work.hits[i] = first + work.body_ids[HIT_PRIM + i]
-                work.ray[RAY_TFAR + i] = work.body_ray[RAY_TFAR + i]
-
-
-@njit(nogil=True, cache=True, error_model="numpy", _nrt=False)
-def render_static_flat(
-    scene: int, camera: FloatArray, pattern: Sampling, tables: Tables, work: Workspace,
-    counter: NDArray[np.int64], out: NDArray[np.float32],
-) -> None:  # fmt: skip
-    """Render rows until there are none left: nothing moves, no textures."""
-    fill_columns(pattern, work.keys)
-    while True:
-        row = _take_next(counter)
-        if row >= out.shape[0]:
-            return
-        fill_keys(pattern, row, work.keys)
-        samples = out.shape[1] * pattern.samples
-        for first in range(0, samples, LANES):
-            lanes = min(LANES, samples - first)
-            fill_positions(pattern, work.keys, row, first, lanes, work.scratch)
-            fill_rays(camera, work.scratch, work.ray)
-            _trace(scene, work, lanes)
-            shade_flat(tables, work.hits, work.scratch)
-            add_samples(pattern.samples, row, first, lanes, work.scratch, work.sums, out)
-
-
-@njit(nogil=True, cache=True, error_model="numpy", _nrt=False)
-def render_static_textured(
-    scene: int, camera: FloatArray, pattern: Sampling, tables: Tables, work: Workspace,
-    counter: NDArray[np.int64], out: NDArray[np.float32],
-) -> None:  # fmt: skip
-    """Render rows until there are none left: nothing moves."""
-    fill_columns(pattern, work.keys)
-    while True:
-        row = _take_next(counter)
-        if row >= out.shape[0]:
-            return
-        fill_keys(pattern, row, work.keys)
-        samples = out.shape[1] * pattern.samples
-        for first in range(0, samples, LANES):
-            lanes = min(LANES, samples - first)
-            fill_positions(pattern, work.keys, row, first, lanes, work.scratch)
-            fill_rays(camera, work.scratch, work.ray)
-            _trace(scene, work, lanes)
-            shade_textured(tables, camera, work.hits, work.scratch)
-            add_samples(pattern.samples, row, first, lanes, work.scratch, work.sums, out)
-
-
-@njit(nogil=True, cache=True, error_model="numpy", _nrt=False)
-def render_moving(
-    scene: int, scenes: NDArray[np.int64], camera: FloatArray, pattern: Sampling, tables: Tables, work: Workspace,
-    counter: NDArray[np.int64], out: NDArray[np.float32],
-) -> None:  # fmt: skip
-    """Render rows until there are none left: every sample has a time of its own."""
-    textured = len(tables.triangles) > 0
-    fill_columns(pattern, work.keys)
-    while True:
-        row = _take_next(counter)
-        if row >= out.shape[0]:
-            return
-        fill_keys(pattern, row, work.keys)
-        samples = out.shape[1] * pattern.samples
-        for first in range(0, samples, LANES):
-            lanes = min(LANES, samples - first)
-            fill_positions(pattern, work.keys, row, first, lanes, work.scratch)
-            fill_times(pattern, work.keys, first, lanes, work.scratch)
-            fill_moving_rays(camera, work.scratch, work.ray)
-            _trace(scene, work, lanes)
-            _trace_bodies(scenes, tables, work, row, first // pattern.samples, (first + lanes - 1) // pattern.samples)
-            if textured:
-                shade_textured(tables, camera, work.hits, work.scratch)
-            else:
-                shade_flat(tables, work.hits, work.scratch)
-            add_samples(pattern.samples, row, first, lanes, work.scratch, work.sums, out)
-
-
-def run_kernel(
-    kernel: Kernel,
-    pool: ThreadPoolExecutor,
-    workspaces: Sequence[Workspace],
-    arguments: tuple[object, ...],
-    out: NDArray[np.float32],
-) -> None:
-    """Fill `out` (h, w, 3) by a kernel on as many threads as there are workspaces, this one included.
-
-    `arguments` are the kernel's, up to its workspace.
-    """
-    counter = np.zeros(1, np.int64)
-    others = [pool.submit(kernel, *arguments, work, counter, out) for work in workspaces[1:]]
-    kernel(*arguments, workspaces[0], counter, out)
-    for other in others:
-        other.result()
 
 
 class PacketEngine:
@@ -246,7 +84,7 @@ class PacketEngine:
         self._bodies: list[TriangleScene] = []
         self._handles = np.zeros(0, np.int64)
         self._threads = threads
-        self._pool = ThreadPoolExecutor(max(threads - 1, 1), "aliasbench-rays")
+        self._pool = ThreadPoolExecutor(threads, "aliasbench-rays")
 
     def _build(self, mesh: Mesh, number: int) -> TriangleScene:
         vertices = mesh.vertices.astype(np.float32)
@@ -268,24 +106,85 @@ class PacketEngine:
         self._handles = np.array([body.handle for body in self._bodies], np.int64)
 
     def fill(
-        self, camera: FloatArray, pattern: Sampling, tables: Tables, moving: bool, out: NDArray[np.float32]
+        self,
+        camera: FloatArray,
+        pattern: Pattern,
+        tables: Tables,
+        moving: bool,
+        out: NDArray[np.float32],
+        progress: Progress | None = None,
     ) -> None:
-        """Write the picture (h, w, 3)."""
-        if self._still is None:
-            raise RuntimeError("this renderer has been closed")
-        shared: tuple[object, ...] = (camera, pattern, tables)
+        """Write the picture (h, w, 3), every sample counting in its own pixel alone."""
         if moving:
-            kernel, arguments = render_moving, (self._still.handle, self._handles, *shared)
+            kernel, handles = render_moving, (self._still_handle, self._handles)
         else:
             textured = len(tables.triangles) > 0
-            kernel = render_static_textured if textured else render_static_flat
-            arguments = (self._still.handle, *shared)
-        workspaces = [make_workspace(out.shape[1]) for _ in range(min(self._threads, len(out)))]
+            kernel, handles = render_static_textured if textured else render_static_flat, (self._still_handle,)
+        self._run(kernel, (*handles, camera, pattern, tables), out.shape[1], 0, out, progress)
+
+    def expose(
+        self,
+        camera: FloatArray,
+        pattern: Pattern,
+        tables: Tables,
+        moving: bool,
+        scattering: Scattering | None,
+        film: Film,
+    ) -> None:
+        """Add samples to a film; `scattering` where paths of light are needed."""
+        kernel = film_moving if moving else film_static
+        handles: tuple[object, ...] = (self._still_handle,)
+        if scattering is not None:
+            from aliasbench.renderers.raytrace.path_kernels import film_paths
+
+            kernel, handles = film_paths, (scattering, moving, self._still_handle, self._handles)
+        elif moving:
+            handles = (self._still_handle, self._handles)
+        self._run(kernel, (*handles, camera, pattern, tables), film.begins.shape[1], film.margin, film, None)
+
+    @property
+    def _still_handle(self) -> int:
+        if self._still is None:
+            raise RuntimeError("this renderer has been closed")
+        return self._still.handle
+
+    def _run(
+        self,
+        kernel: Kernel,
+        arguments: tuple[object, ...],
+        width: int,
+        margin: int,
+        out: NDArray[np.float32] | Film,
+        progress: Progress | None,
+    ) -> None:
+        """Run a kernel on every thread, this one too unless progress is asked for."""
+        camera, pattern, tables = arguments[-3:]
+        assert isinstance(camera, np.ndarray)
+        assert isinstance(pattern, Pattern)
+        assert isinstance(tables, Tables)
+        rows = len(out.begins) if isinstance(out, Film) else len(out)
+        # Paths have a second workspace for their shadow rays.
+        each = 2 if isinstance(arguments[0], Scattering) else 1
+        threads = max(1, min(self._threads, rows))
+        workspaces = [[make_workspace(width, pattern, margin) for _ in range(each)] for _ in range(threads)]
         if len(tables.triangles) and (tables.objects[:, CUTOFF] > -np.inf).any():
             from aliasbench.renderers.raytrace.cutout_filter import set_holes
 
-            workspaces = [w._replace(holes=set_holes(w.arguments, tables, camera, w.scratch)) for w in workspaces]
-        run_kernel(kernel, self._pool, workspaces, arguments, out)
+            workspaces = [
+                [w._replace(holes=set_holes(w.arguments, tables, camera, w.scratch)) for w in own] for own in workspaces
+            ]
+        rooms = [(*own, make_paths()) if each > 1 else tuple(own) for own in workspaces]
+        counter = np.zeros(1, np.int64)
+        here = 0 if progress is not None else 1
+        others = [self._pool.submit(kernel, *arguments, *own, counter, out) for own in rooms[here:]]
+        if progress is None:
+            kernel(*arguments, *rooms[0], counter, out)
+        else:
+            while not all(other.done() for other in others):
+                progress(min(1.0, int(counter[0]) / max(rows, 1)))
+                time.sleep(_REPORTS_S)
+        for other in others:
+            other.result()
 
     def close(self) -> None:
         """Free everything (again is harmless)."""

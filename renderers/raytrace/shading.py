@@ -54,8 +54,9 @@ from aliasbench.scenes.model import FloatArray
 
 MISS = -1
 
-# Values of a triangle: plane n . P = k, then u = U_MAP . P + U_SHIFT and v likewise, P in the mesh's own frame.
-NORMAL, OFFSET, U_MAP, U_SHIFT, V_MAP, V_SHIFT, TRIANGLE_SIZE = 0, 3, 4, 7, 8, 11, 12
+# Values of a triangle: plane n . P = k, then u = U_MAP . P + U_SHIFT and v likewise, P in the mesh's own frame, and its
+# corners' largest coordinate there.
+NORMAL, OFFSET, U_MAP, U_SHIFT, V_MAP, V_SHIFT, REACH, TRIANGLE_SIZE = 0, 3, 4, 7, 8, 11, 12, 13
 
 
 class Tables(NamedTuple):
@@ -67,7 +68,7 @@ class Tables(NamedTuple):
     owners : (m,) int32
         Object of every triangle: those of the still mesh first, then those of the moving bodies in order.
     triangles : (m, TRIANGLE_SIZE) float64
-        Empty (0 rows) where no object has a texture.
+        Empty (0 rows) where no object has a texture and no light is scattered.
     bodies : (b, BODY_SIZE) float64
     firsts : (b + 1,) int64
         First triangle of every moving body, and the end.
@@ -75,6 +76,8 @@ class Tables(NamedTuple):
         First texel, width and height of every mip level.
     texels : (t, 4) float32
         Linear RGBA of all levels, one after the other.
+    lights : (l, LIGHT_SIZE) float64
+        See `paths`.
     background : (3,) float64
     footprint : float
         Width of a sample's footprint in pixels.
@@ -87,6 +90,7 @@ class Tables(NamedTuple):
     firsts: NDArray[np.int64]
     levels: NDArray[np.int64]
     texels: NDArray[np.float32]
+    lights: FloatArray
     background: FloatArray
     footprint: float
 
@@ -276,3 +280,28 @@ def _direction_to_body(
     lane_to_body(values, scratch, i)
     scratch[DX + i], scratch[DY + i], scratch[DZ + i] = dx, dy, dz
     return scratch[MX + i], scratch[MY + i], scratch[MZ + i]
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def meet_plane(tables: Tables, hit: int, scratch: FloatArray, i: int) -> tuple[float, float, float, float]:
+    """Return the ray parameter at which lane i meets a triangle's plane, and the plane's normal, of any length.
+
+    A body's normal n belongs to n . M x for the affine map M into its frame, whose gradient is transposed M times n.
+    """
+    row = tables.triangles[hit]
+    nx, ny, nz = row[NORMAL], row[NORMAL + 1], row[NORMAL + 2]
+    if hit < tables.firsts[0]:
+        along = nx * scratch[DX + i] + ny * scratch[DY + i] + nz * scratch[DZ + i]
+        t = (row[OFFSET] - (nx * scratch[OX + i] + ny * scratch[OY + i] + nz * scratch[OZ + i])) / along
+        return t, nx, ny, nz
+    body = 0
+    while hit >= tables.firsts[body + 1]:
+        body += 1
+    values = tables.bodies[body]
+    lane_to_body(values, scratch, i)
+    along = nx * scratch[MX + i] + ny * scratch[MY + i] + nz * scratch[MZ + i]
+    t = (row[OFFSET] - (nx * scratch[LX + i] + ny * scratch[LY + i] + nz * scratch[LZ + i])) / along
+    ax, ay, az = _direction_to_body(values, scratch, i, 1.0, 0.0, 0.0)
+    bx, by, bz = _direction_to_body(values, scratch, i, 0.0, 1.0, 0.0)
+    cx, cy, cz = _direction_to_body(values, scratch, i, 0.0, 0.0, 1.0)
+    return t, nx * ax + ny * ay + nz * az, nx * bx + ny * by + nz * bz, nx * cx + ny * cy + nz * cz

@@ -16,7 +16,9 @@ from aliasbench.renderers.raytrace.lanes import (
     CENTER_Y,
     EYE,
     EYE_TRAVEL,
+    FOCUS,
     FORWARD,
+    LENS_RADIUS,
     PERSPECTIVE,
     RIGHT,
     SCALE,
@@ -27,6 +29,7 @@ from aliasbench.renderers.raytrace.lanes import (
 from aliasbench.renderers.raytrace.shading import (
     NORMAL,
     OFFSET,
+    REACH,
     TRIANGLE_SIZE,
     U_MAP,
     U_SHIFT,
@@ -57,7 +60,6 @@ from aliasbench.renderers.raytrace.texturing import (
     ZONE,
 )
 from aliasbench.scenes.model import Checker, FloatArray, Grating, ImageTexture, Scene, Texture
-from aliasbench.scenes.motion import object_matrix
 from aliasbench.scenes.textures import MipChain, scene_chain
 
 _CHAIN_KIND = {"point": NEAREST, "linear": TRILINEAR, "mipmap": MIPMAP, "trilinear": TRILINEAR}
@@ -86,7 +88,7 @@ def merge_bodies(scene: Scene, looks: "Looks", bodies: Sequence[Body], shutter: 
     """Return bodies as they stand when the shutter opens, relative to `anchor`, as one mesh."""
     vertices, triangles, count = [np.zeros((0, 3))], [np.zeros((0, 3), np.int32)], 0
     for body in bodies:
-        world = object_matrix(body.motion, scene.animation, shutter.frame, shutter.opening)
+        world = shutter.place(body.motion, scene.animation, shutter.opening)
         matrix = body.local_matrix(world, anchor)
         if body.layer:
             matrix = layer_matrix(shutter.first, body.layer, shutter.layer_depth, anchor) @ matrix
@@ -119,6 +121,7 @@ def camera_values(scene: Scene, shutter: Shutter, anchor: FloatArray) -> FloatAr
         out[at : at + 3] = axis
     out[SCALE], out[PERSPECTIVE] = first.scale, float(first.perspective)
     out[CENTER_X], out[CENTER_Y] = first.width / 2, first.height / 2
+    out[LENS_RADIUS], out[FOCUS] = camera.lens_radius, camera.focus_distance or 0.0
     out[TURNING] = float(bool(out[AXIS_TRAVEL : AXIS_TRAVEL + 3].any()))
     return out
 
@@ -140,6 +143,7 @@ def triangle_values(mesh: Mesh) -> FloatArray:
         gradient = (uv[1] - uv[0])[:, k, None] * along_first + (uv[2] - uv[0])[:, k, None] * along_second
         out[:, at : at + 3] = gradient
         out[:, shift] = uv[0][:, k] - np.einsum("ij,ij->i", gradient, a)
+    out[:, REACH] = np.abs(np.stack([a, b, c])).max(axis=(0, 2)) if len(out) else 0.0
     return out
 
 
@@ -228,9 +232,12 @@ class Ownership:
     counts: tuple[int, ...]
 
 
-def build_ownership(meshes: Sequence[Mesh], *, textured: bool) -> Ownership:
-    """Return what hits on meshes are looked up by, the meshes' triangles one after the other."""
-    rows = [triangle_values(mesh) for mesh in meshes] if textured else []
+def build_ownership(meshes: Sequence[Mesh], *, placed: bool) -> Ownership:
+    """Return what hits on meshes are looked up by, the meshes' triangles one after the other.
+
+    `placed`: the place of a hit matters.
+    """
+    rows = [triangle_values(mesh) for mesh in meshes] if placed else []
     return Ownership(
         np.concatenate([np.zeros(0, np.int32), *(mesh.owners for mesh in meshes)]),
         np.concatenate([np.zeros((0, TRIANGLE_SIZE)), *rows]),
@@ -239,9 +246,18 @@ def build_ownership(meshes: Sequence[Mesh], *, textured: bool) -> Ownership:
 
 
 def build_tables(
-    scene: Scene, looks: Looks, still: Ownership, moving: Ownership, bodies: FloatArray, footprint: float
+    scene: Scene,
+    looks: Looks,
+    still: Ownership,
+    moving: Ownership,
+    bodies: FloatArray,
+    lights: FloatArray,
+    footprint: float,
 ) -> Tables:
-    """Return everything that hits are looked up in, for one exposure; `bodies` (b, BODY_SIZE) are those that move."""
+    """Return everything that hits are looked up in, for one exposure.
+
+    `bodies` (b, BODY_SIZE) are those that move, `lights` as `lighting.light_values` has them.
+    """
     still_only = not moving.owners.size
     return Tables(
         looks.objects,
@@ -251,6 +267,7 @@ def build_tables(
         np.cumsum([len(still.owners), *moving.counts], dtype=np.int64),
         looks.levels,
         looks.texels,
+        lights,
         np.asarray(scene.background, dtype=np.float64),
         footprint,
     )

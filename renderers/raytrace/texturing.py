@@ -11,21 +11,10 @@ from aliasbench.renderers.raytrace.lanes import BLUE, GREEN, LANES, LOD, RED, U,
 from aliasbench.renderers.raytrace.trig import cos_turns
 from aliasbench.scenes.model import FloatArray
 
-# Values of an object: colour, kind of texture, what that kind needs, and below which alpha it is absent (-inf: none).
-COLOR, KIND, PLACE, LOW, SPAN, PHASE, RATE, LEVEL, LEVELS, UV_MATRIX, CUTOFF, OBJECT_SIZE = (
-    0,
-    3,
-    4,
-    6,
-    9,
-    12,
-    13,
-    14,
-    15,
-    16,
-    22,
-    23,
-)
+# Values of an object: colour, kind of texture, what that kind needs, below which alpha it is absent (-inf: none), and
+# how it answers light (`paths`).
+COLOR, KIND, PLACE, LOW, SPAN, PHASE, RATE, LEVEL, LEVELS, UV_MATRIX, CUTOFF = 0, 3, 4, 6, 9, 12, 13, 14, 15, 16, 22
+MATERIAL, ROUGHNESS, CAUCHY_A, CAUCHY_B, OBJECT_SIZE = 23, 24, 25, 26, 27
 PLAIN, CHECKER, SINE, SQUARE, ZONE = 0.0, 1.0, 2.0, 3.0, 4.0
 NEAREST, MIPMAP, TRILINEAR = 5.0, 6.0, 7.0
 

@@ -1,7 +1,7 @@
 """The ray tracer behind the renderers' contract: a scene and a technique in, frames out.
 
-What it does not have yet is refused here, before anything is built; what a frame is made from is `exposure`'s to say,
-what traces it an engine's: `packets`, or `portable` on platforms without and as the check on it.
+What a frame is made from is `exposure`'s to say, who gets how many samples and what becomes of them `development`'s,
+and what traces them an engine's: `packets`, or `portable` on platforms without and as the check on it.
 """
 
 import os
@@ -16,8 +16,11 @@ from numpy.typing import NDArray
 from aliasbench.renderers.frame import Frame
 from aliasbench.renderers.geometry import build_bodies
 from aliasbench.renderers.raytrace.bodies import BODY_SIZE, body_values
+from aliasbench.renderers.raytrace.development import Development, Progress, is_plain, make_optics
 from aliasbench.renderers.raytrace.exposure import Exposure, plan_exposure
-from aliasbench.renderers.raytrace.lanes import Sampling, build_sampling
+from aliasbench.renderers.raytrace.film import Film
+from aliasbench.renderers.raytrace.lighting import is_scattered, light_values, put_materials, with_lights
+from aliasbench.renderers.raytrace.paths import Scattering
 from aliasbench.renderers.raytrace.shading import Tables
 from aliasbench.renderers.raytrace.tables import (
     Mesh,
@@ -29,18 +32,18 @@ from aliasbench.renderers.raytrace.tables import (
     merge_bodies,
 )
 from aliasbench.renderers.sampling.hashing import frame_key
-from aliasbench.renderers.sampling.patterns import pattern_frame, sampler_code
+from aliasbench.renderers.sampling.patterns import Pattern, make_pattern, pattern_frame
 from aliasbench.renderers.technique import Technique
-from aliasbench.renderers.unlit import check_unlit
-from aliasbench.scenes.errors import InputError, NotAvailableError
+from aliasbench.scenes.errors import InputError
 from aliasbench.scenes.model import FloatArray, Scene
 
 THREADS_VARIABLE = "ALIASBENCH_THREADS"
 _MAX_THREADS = 1024
+MOST_SAMPLES = 2**32
 
 
 class Engine(Protocol):
-    """What traces: given meshes once and again, it fills pictures."""
+    """What traces: given meshes once and again, it fills pictures and film."""
 
     def set_still(self, mesh: Mesh) -> None:
         """Take the mesh that stands still (replacing the one before)."""
@@ -51,9 +54,27 @@ class Engine(Protocol):
         ...
 
     def fill(
-        self, camera: FloatArray, pattern: Sampling, tables: Tables, moving: bool, out: NDArray[np.float32]
+        self,
+        camera: FloatArray,
+        pattern: Pattern,
+        tables: Tables,
+        moving: bool,
+        out: NDArray[np.float32],
+        progress: Progress | None = None,
     ) -> None:
-        """Write the picture (h, w, 3)."""
+        """Write the picture (h, w, 3), every sample counting in its own pixel alone; scenes without lens or light."""
+        ...
+
+    def expose(
+        self,
+        camera: FloatArray,
+        pattern: Pattern,
+        tables: Tables,
+        moving: bool,
+        scattering: Scattering | None,
+        film: Film,
+    ) -> None:
+        """Add samples to a film; `scattering` where paths of light are needed."""
         ...
 
     def close(self) -> None:
@@ -77,36 +98,20 @@ def thread_count() -> int:
     return int(given)
 
 
-def check_available(scene: Scene, technique: Technique) -> None:
-    """Raise for what the ray tracer does not have: `NotAvailableError` a technique's, `UnsupportedScene` a scene's."""
-    t = technique
-    sampler_code(t.sampler)
-    refused: tuple[tuple[bool, str, str], ...] = (
-        (t.filter != "box" or t.radius_px != 0.5, f"filter={t.filter},radius={t.radius_px:g}", "filter=box,radius=.5"),
-        (t.weighting != "samples", f"weighting={t.weighting}", "weighting=samples"),
-        (t.adaptive != "off", f"adaptive={t.adaptive}", "adaptive=off"),
-        (t.motion != "exact", f"motion={t.motion}", "motion=exact"),
-        (t.texture == "ewa", "texture=ewa", "texture=point, linear, mipmap and trilinear"),
-    )
-    for is_refused, asked, instead in refused:
-        if is_refused:
-            raise NotAvailableError(f"{asked} is not available in the ray tracer yet; available: {instead}")
-    check_unlit("raytrace", scene)
-
-
 def prepare_raytrace(scene: Scene, technique: Technique, size: tuple[int, int]) -> "PreparedRaytrace":
     """Return the scene ready to be traced at `size` = (width, height).
 
     Raises
     ------
-    NotAvailableError
-        For a documented technique that the ray tracer does not have yet.
-    UnsupportedScene
-        For what the scene has and the ray tracer does not draw.
     InputError
-        For a degenerate camera, or a bad ALIASBENCH_THREADS.
+        For a degenerate camera, more than 2^32 samples, a filter too wide for memory, or a bad ALIASBENCH_THREADS.
     """
-    check_available(scene, technique)
+    spp = technique.spp if technique.adaptive == "off" else technique.max_spp
+    if size[0] * size[1] * spp > MOST_SAMPLES:
+        raise InputError(
+            f"{size[0]} x {size[1]} pixels at {spp} samples are more than 2^32 samples in all; "
+            "a smaller picture or fewer samples are not"
+        )
     threads = thread_count()
     started = time.perf_counter()
     if technique.engine == "packet":
@@ -131,9 +136,13 @@ class PreparedRaytrace:
         "_bodies",
         "_engine",
         "_footprint",
+        "_is_plain",
+        "_is_scattered",
         "_looks",
         "_mesh_key",
         "_moving",
+        "_optics",
+        "_placed",
         "_scene",
         "_setup_seconds",
         "_size",
@@ -144,34 +153,44 @@ class PreparedRaytrace:
     def __init__(
         self, scene: Scene, technique: Technique, size: tuple[int, int], engine: Engine, started: float
     ) -> None:
-        self._scene = scene
+        self._is_scattered = is_scattered(scene)
+        self._scene = scene = with_lights(scene)
         self._technique = technique
         self._size = size
         self._engine = engine
         self._bodies = build_bodies(scene)
         self._looks = build_looks(scene, technique.texture)
+        put_materials(scene, self._looks.objects)
+        self._placed = self._looks.textured or self._is_scattered
         self._footprint = float(technique.shading_samples) ** -0.5
         self._mesh_key: tuple[int, ...] = ()
-        self._still = self._moving = build_ownership((), textured=False)
+        self._still = self._moving = build_ownership((), placed=False)
+        self._optics = make_optics(technique)
+        self._is_plain = is_plain(technique) and scene.camera.lens_radius == 0.0 and not self._is_scattered
         exposure = plan_exposure(scene, technique, size, self._bodies, 0)
         meshes = [body_mesh(body, self._looks) for body in exposure.moving]
         engine.set_moving(meshes)
-        self._moving = build_ownership(meshes, textured=self._looks.textured)
+        self._moving = build_ownership(meshes, placed=self._placed)
         self._place(exposure)
         self._setup_seconds = time.perf_counter() - started
-        self._fill(exposure, build_sampling(technique.sampler, 1, frame_key(0, 0), shared=False), (1, 1))
+        self._size = (1, 1)
+        self._expose(exposure, frame_key(0, 0), None)
+        self._size = size
 
-    def render(self, frame: int = 0, seed: int = 0) -> Frame:
-        """Return frame number `frame`; the same arguments give the same pixels on any number of threads."""
+    def render(self, frame: int = 0, seed: int = 0, progress: Progress | None = None) -> Frame:
+        """Return frame number `frame`; the same arguments give the same pixels on any number of threads.
+
+        `progress`, where given, is told the share that is done, from 0 to 1, now and then.
+        """
         started = time.perf_counter()
         technique = self._technique
         exposure = plan_exposure(self._scene, technique, self._size, self._bodies, frame)
         self._place(exposure)
         start = frame_key(seed, pattern_frame(technique.reseed, frame))
-        pattern = build_sampling(technique.sampler, technique.spp, start, shared=technique.pattern == "shared")
-        pixels = self._fill(exposure, pattern, self._size)
+        pixels, counts = self._expose(exposure, start, progress)
         seconds = time.perf_counter() - started
-        return Frame(pixels, seconds, self._setup_seconds, self._size[0] * self._size[1] * technique.spp)
+        samples = self._size[0] * self._size[1] * technique.spp if counts is None else int(counts.sum(dtype=np.int64))
+        return Frame(pixels, seconds, self._setup_seconds, samples, counts)
 
     def _place(self, exposure: Exposure) -> None:
         """Give the engine the still mesh of an exposure, unless it has it."""
@@ -179,18 +198,39 @@ class PreparedRaytrace:
             return
         mesh = merge_bodies(self._scene, self._looks, exposure.still, exposure.shutter, exposure.anchor)
         self._engine.set_still(mesh)
-        self._still = build_ownership((mesh,), textured=self._looks.textured)
+        self._still = build_ownership((mesh,), placed=self._placed)
         self._mesh_key = exposure.mesh_key
 
-    def _fill(self, exposure: Exposure, pattern: Sampling, size: tuple[int, int]) -> NDArray[np.float32]:
-        scene, shutter, anchor = self._scene, exposure.shutter, exposure.anchor
+    def _expose(
+        self, exposure: Exposure, start: int, progress: Progress | None
+    ) -> tuple[NDArray[np.float32], NDArray[np.int32] | None]:
+        """Return the picture, and the number of samples of each pixel where they differ."""
+        scene, shutter, anchor, t = self._scene, exposure.shutter, exposure.anchor, self._technique
         bodies = np.zeros((len(exposure.moving), BODY_SIZE))
         for values, body in zip(bodies, exposure.moving, strict=True):
             values[:] = body_values(scene, body, shutter, anchor)
-        tables = build_tables(scene, self._looks, self._still, self._moving, bodies, self._footprint)
-        out = np.zeros((size[1], size[0], 3), np.float32)
-        self._engine.fill(camera_values(scene, shutter, anchor), pattern, tables, exposure.has_times, out)
-        return out
+        lights = light_values(scene, anchor)
+        tables = build_tables(scene, self._looks, self._still, self._moving, bodies, lights, self._footprint)
+        camera = camera_values(scene, shutter, anchor)
+        is_adaptive = t.adaptive != "off"
+        pattern = make_pattern(
+            t.sampler,
+            t.max_spp if is_adaptive else t.spp,
+            start,
+            shared=t.pattern == "shared",
+            progressive=is_adaptive,
+        )
+        if self._is_plain:
+            out = np.zeros((self._size[1], self._size[0], 3), np.float32)
+            self._engine.fill(camera, pattern, tables, exposure.has_times, out, progress)
+            return out, None
+        has_times = exposure.has_times or scene.camera.lens_radius > 0.0
+        scattering = Scattering(t.shadow_rays, scene.bounces) if self._is_scattered else None
+
+        def expose(pattern: Pattern, film: Film) -> None:
+            self._engine.expose(camera, pattern, tables, has_times, scattering, film)
+
+        return Development(t, self._size, pattern, self._optics, expose, progress).run()
 
     def close(self) -> None:
         """Free what the engine holds (again is harmless)."""

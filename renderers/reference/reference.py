@@ -242,6 +242,10 @@ def _brightest(scene: Scene) -> float:
 
 def _refuse_missing(scene: Scene) -> None:
     """Raise for what a scene has and references do not have yet."""
+    if scene.bounces:
+        raise UnsupportedScene(
+            f"reference: diffuse interreflection (bounces = {scene.bounces}) is not drawn; direct light is (bounces = 0)"
+        )
     for index, surface in enumerate(scene.objects):
         if surface.material.kind not in ("unlit", "diffuse"):
             raise UnsupportedScene(

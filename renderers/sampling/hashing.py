@@ -8,6 +8,8 @@ another linearly showed as a bias of three standard errors.
 import numpy as np
 from numba import njit
 
+from aliasbench.renderers.sampling.bits import add32, and32, mul32, or32, shift_right32, xor32
+
 MASK = np.uint64(0xFFFFFFFF)
 _MULTIPLIER_1 = np.uint64(0x7FEB352D)
 _MULTIPLIER_2 = np.uint64(0x846CA68B)
@@ -96,3 +98,26 @@ def permute(index: int, count: int, key: int) -> int:
         if i < np.uint64(count):
             break
     return int((i + p) % np.uint64(count))
+
+
+@njit(inline="always", cache=True)
+def permute_power(index: int, mask: np.uint32, key: np.uint32) -> np.uint32:
+    """Return `permute` for a count of mask + 1, a power of two: without a loop, so that many are done at once."""
+    p, i = key, xor32(np.uint32(index), key)
+    i = mul32(i, np.uint32(0xE170893D))
+    i = xor32(i, shift_right32(p, np.uint32(16)))
+    i = xor32(i, shift_right32(and32(i, mask), np.uint32(4)))
+    i = xor32(i, shift_right32(p, np.uint32(8)))
+    i = mul32(i, np.uint32(0x0929EB3F))
+    i = xor32(i, shift_right32(p, np.uint32(23)))
+    i = xor32(i, shift_right32(and32(i, mask), np.uint32(1)))
+    i = mul32(i, or32(np.uint32(1), shift_right32(p, np.uint32(27))))
+    i = mul32(i, np.uint32(0x6935FA69))
+    i = xor32(i, shift_right32(and32(i, mask), np.uint32(11)))
+    i = mul32(i, np.uint32(0x74DCB303))
+    i = xor32(i, shift_right32(and32(i, mask), np.uint32(2)))
+    i = mul32(i, np.uint32(0x9E501CC3))
+    i = xor32(i, shift_right32(and32(i, mask), np.uint32(2)))
+    i = and32(mul32(i, np.uint32(0xC860A3DF)), mask)
+    i = xor32(i, shift_right32(i, np.uint32(5)))
+    return and32(add32(i, p), mask)

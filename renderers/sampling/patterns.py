@@ -1,25 +1,87 @@
 """Where and when the samples of a pixel lie: one definition for the tracer's kernels and the rasterizer's passes.
 
-A sample set of N is addressed by (seed, frame, pixel, index): the pixel position comes from the stratum `index`, the
-shutter time, lens and light from strata in orders of their own, so that all are well spread together (Cook 1984).
+A sample set of N is addressed by (seed, frame, pixel, index, dimension): any number of it can be computed in any order
+on any thread. All dimensions are well spread in themselves and together (Cook 1984): the shutter's times, lens and
+light points, wavelengths and directions are strata in orders of their own, or further dimensions of one sequence.
+
+    center         all in the middle of the pixel
+    grid           the centres of equal cells
+    random         independent uniform points
+    jittered       one uniform point in each cell
+    multijittered  jittered in cells and, correlated (Kensler 2013), in finer rows and columns as well
+    sobol          the first N points of Sobol's (0, 2)-sequence under Owen's scrambling; any prefix is well spread
+    bluenoise      sobol with scramblings arranged over the picture so that neighbours' errors cancel (`bluenoise`)
 
 N that is no square: round(sqrt N) rows, row i holds n_i cells of height n_i / N, all of area 1 / N (DESIGN.md).
 """
 
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
-from aliasbench.renderers.sampling.hashing import SHARED, combine, pattern_key, permute, unit
-from aliasbench.scenes.errors import NotAvailableError
+from aliasbench.renderers.sampling._stub import bluenoise_tile, tile_keys, tile_offset
+from aliasbench.renderers.sampling.hashing import SHARED, combine, frame_key, permute, pixel_key, unit
+from aliasbench.renderers.sampling.sobol import TABLE_BITS, WordArray, scrambled_unit, shuffled, sobol_bits, sobol_tables
+from aliasbench.scenes.errors import unknown_name
 from aliasbench.scenes.model import FloatArray
 
-CENTER, GRID, RANDOM, JITTERED = 0, 1, 2, 3
-SAMPLERS: Mapping[str, int] = {"center": CENTER, "grid": GRID, "random": RANDOM, "jittered": JITTERED}
+CENTER, GRID, RANDOM, JITTERED, MULTIJITTERED, SOBOL, BLUENOISE = 0, 1, 2, 3, 4, 5, 6
+SAMPLERS: Mapping[str, int] = {
+    "center": CENTER,
+    "grid": GRID,
+    "random": RANDOM,
+    "jittered": JITTERED,
+    "multijittered": MULTIJITTERED,
+    "sobol": SOBOL,
+    "bluenoise": BLUENOISE,
+}
 
-# Dimensions: each has a stream of its own.
-DIM_X, DIM_Y, DIM_TIME, DIM_LENS, DIM_LIGHT = 0, 1, 2, 3, 5
+# Dimensions: each has a stream of its own; lens, light and direction take two.
+DIM_X, DIM_Y, DIM_TIME, DIM_LENS, DIM_LIGHT, DIM_WAVELENGTH, DIM_DIRECTION = 0, 1, 2, 3, 5, 7, 8
+DIMENSIONS = 10
+_ORDER, _COLUMNS, _ROWS = 1, 2, 3  # what streams are derived from a dimension's
+_MOST_NUMBERS = 2**24
+_SHORT = 1 << TABLE_BITS
+
+
+class Pattern(NamedTuple):
+    """A sample set of every pixel of one frame, as data for kernels.
+
+    Attributes
+    ----------
+    sampler, count : int
+        The sampler's number and N.
+    start : uint64
+        `frame_key` of seed and frame.
+    shared : bool
+        One set for all pixels.
+    progressive : bool
+        Not all N may be taken: orders of other dimensions must be good from the first sample on.
+    cells : (4, N) float64
+        Left, top, width and height of the cell that each sample is spread over, in the unit square.
+    places : (3, N) int32
+        Of multijittered samples: row, place in the row, and by how much the row is longer than the shortest.
+    tables : (2, 3, 4096) uint32
+        See `sobol.sobol_tables`; empty for other samplers.
+    tile : (side, side) uint32
+        See `bluenoise.bluenoise_tile`; empty for other samplers.
+    offsets : (DIMENSIONS, 2) int64
+        Where each dimension's tile starts, column and row.
+    """
+
+    sampler: int
+    count: int
+    start: np.uint64
+    shared: bool
+    progressive: bool
+    cells: FloatArray
+    places: NDArray[np.int32]
+    tables: WordArray
+    tile: WordArray
+    offsets: NDArray[np.int64]
 
 
 def sampler_code(name: str) -> int:
@@ -27,12 +89,32 @@ def sampler_code(name: str) -> int:
 
     Raises
     ------
-    NotAvailableError
-        For a sampler that is documented but not there yet.
+    InputError
+        For another name.
     """
     if name not in SAMPLERS:
-        raise NotAvailableError(f"sampler={name} is not available yet; available: {', '.join(SAMPLERS)}")
+        raise unknown_name("sampler", name, SAMPLERS)
     return SAMPLERS[name]
+
+
+def make_pattern(name: str, count: int, start: int, *, shared: bool, progressive: bool = False) -> Pattern:
+    """Return the pattern of `count` samples a pixel under a sampler's name; `start` is `frame_key` of seed and frame."""
+    code = sampler_code(name)
+    cells = np.zeros((4, count))
+    tables, tile = np.zeros((2, 0, 0), np.uint32), np.zeros((0, 0), np.uint32)
+    offsets = np.zeros((DIMENSIONS, 2), np.int64)
+    places = np.zeros((3, count if code == MULTIJITTERED else 0), np.int32)
+    if code == MULTIJITTERED:
+        _fill_places(count, places)
+    if code in (SOBOL, BLUENOISE):
+        tables = sobol_tables()
+    else:
+        _fill_cells(code, count, cells)
+    if code == BLUENOISE:
+        tile = bluenoise_tile(count).copy()  # kernels know writable arrays and others apart
+        for dimension in range(DIMENSIONS):
+            offsets[dimension] = tile_offset(np.uint64(start), dimension, len(tile))
+    return Pattern(code, count, np.uint64(start), shared, progressive, cells, places, tables, tile, offsets)
 
 
 @njit(cache=True)
@@ -42,8 +124,8 @@ def row_count(count: int) -> int:
 
 
 @njit(inline="always", cache=True)
-def cell_position(index: int, count: int, rows: int, u: float, v: float) -> tuple[float, float]:
-    """Return (x, y) in the unit square of the point (u, v) of stratum `index` (row-major) out of `count`.
+def cell_of(index: int, count: int, rows: int) -> tuple[int, int, int]:
+    """Return the row of stratum `index` (row-major) out of `count`, the row's first stratum, and how many it has.
 
     Row i holds cells floor(i count / rows) .. floor((i + 1) count / rows) - 1.
     """
@@ -52,52 +134,155 @@ def cell_position(index: int, count: int, rows: int, u: float, v: float) -> tupl
     if first > index:
         row -= 1
         first = row * count // rows
-    after = (row + 1) * count // rows
-    n = after - first
+    return row, first, (row + 1) * count // rows - first
+
+
+@njit(inline="always", cache=True)
+def cell_position(index: int, count: int, rows: int, u: float, v: float) -> tuple[float, float]:
+    """Return (x, y) in the unit square of the point (u, v) of stratum `index` out of `count`; see `cell_of`."""
+    _, first, n = cell_of(index, count, rows)
     return (index - first + u) / n, (first + v * n) / count
 
 
-@njit(inline="always", cache=True)
-def pixel_position(sampler: int, count: int, rows: int, index: int, key: int) -> tuple[float, float]:
-    """Return a sample's place in its pixel, x right and y down, both in [0, 1)."""
-    if sampler == CENTER:
-        return 0.5, 0.5
-    if sampler == GRID:
-        return cell_position(index, count, rows, 0.5, 0.5)
-    u = unit(combine(key, DIM_X), index)
-    v = unit(combine(key, DIM_Y), index)
-    if sampler == RANDOM:
-        return u, v
-    return cell_position(index, count, rows, u, v)
+@njit(cache=True, error_model="numpy")
+def _fill_cells(sampler: int, count: int, cells: FloatArray) -> None:
+    rows = row_count(count)
+    for index in range(count):
+        if sampler == CENTER:
+            cells[0, index], cells[1, index] = 0.5, 0.5
+        elif sampler == RANDOM:
+            cells[2, index], cells[3, index] = 1.0, 1.0
+        elif sampler == GRID:
+            cells[0, index], cells[1, index] = cell_position(index, count, rows, 0.5, 0.5)
+        else:
+            x0, y0 = cell_position(index, count, rows, 0.0, 0.0)
+            x1, y1 = cell_position(index, count, rows, 1.0, 1.0)
+            cells[0, index], cells[1, index], cells[2, index], cells[3, index] = x0, y0, x1 - x0, y1 - y0
+
+
+@njit(cache=True, error_model="numpy")
+def _fill_places(count: int, places: NDArray[np.int32]) -> None:
+    rows = row_count(count)
+    for index in range(count):
+        row, first, n = cell_of(index, count, rows)
+        places[0, index], places[1, index], places[2, index] = row, index - first, n - count // rows
 
 
 @njit(inline="always", cache=True)
-def shutter_position(sampler: int, count: int, index: int, key: int) -> float:
-    """Return a sample's time in the open shutter, [0, 1): stratified in an order of its own, at random for `random`.
+def column_order(column: int, cells: int, stream: int) -> int:
+    """Return which of a row's `cells` finer rows the multijittered sample in a column takes: the same in all rows."""
+    return permute(column, cells, combine(combine(stream, _COLUMNS), cells))
 
-    The centre and grid samplers take the middle of each stratum; one sample is in the middle of the shutter then.
-    """
-    stream = combine(key, DIM_TIME)
-    if sampler == RANDOM:
-        return unit(stream, index)
-    stratum = permute(index, count, combine(stream, 1))
+
+@njit(inline="always", cache=True)
+def row_order(row: int, rows: int, stream: int) -> int:
+    """Return which of a cell's `rows` finer columns the multijittered samples in a row take: the same in all cells."""
+    return permute(row, rows, combine(stream, _ROWS))
+
+
+@njit(inline="always", cache=True)
+def stream_keys(pattern: Pattern, key: int, column: int, row: int, dimension: int) -> tuple[np.uint64, np.uint64]:
+    """Return the keys of a dimension and the next for the pixel whose `pixel_key` is `key`."""
+    if pattern.sampler == BLUENOISE:
+        side = len(pattern.tile)
+        across = (column + pattern.offsets[dimension, 0]) % side
+        down = (row + pattern.offsets[dimension, 1]) % side
+        first, second = tile_keys(pattern.tile[down, across])
+        return np.uint64(first), np.uint64(second)
+    return combine(key, dimension), combine(key, dimension + 1)
+
+
+@njit(inline="always", cache=True)
+def own_order(pattern: Pattern, count: int, index: int, key: int) -> int:
+    """Return which point of a dimension's set of `count` belongs to sample `index`, under a key of its own."""
+    if pattern.sampler == RANDOM:
+        return index
+    if pattern.sampler == SOBOL or (pattern.sampler == BLUENOISE and pattern.progressive):
+        numbers = _SHORT if pattern.count <= _SHORT else _MOST_NUMBERS
+        return int(shuffled(index, np.uint32(key))) & (numbers - 1)
+    return permute(index, count, key)
+
+
+@njit(inline="always", cache=True)
+def pair_position(
+    pattern: Pattern, count: int, rows: int, number: int, index: int, first: int, second: int
+) -> tuple[float, float]:
+    """Return point `number` of a set of `count` in the unit square, for sample `index` and the streams' keys."""
+    sampler = pattern.sampler
+    if sampler in (SOBOL, BLUENOISE):
+        word = np.uint32(number)
+        return (
+            scrambled_unit(sobol_bits(pattern.tables, 0, word), np.uint32(first)),
+            scrambled_unit(sobol_bits(pattern.tables, 1, word), np.uint32(second)),
+        )
     if sampler in (CENTER, GRID):
-        return (stratum + 0.5) / count
-    return (stratum + unit(stream, index)) / count
-
-
-@njit(inline="always", cache=True)
-def plane_position(sampler: int, count: int, rows: int, index: int, key: int, dim: int) -> tuple[float, float]:
-    """Return a sample's point in the unit square of another pair of dimensions (lens, light), strata permuted."""
-    if count == 1 and sampler in (CENTER, GRID):
-        return 0.5, 0.5
-    first, second = combine(key, dim), combine(key, dim + 1)
+        return cell_position(number, count, rows, 0.5, 0.5)
     u, v = unit(first, index), unit(second, index)
     if sampler == RANDOM:
         return u, v
+    if sampler == MULTIJITTERED:
+        row, start, n = cell_of(number, count, rows)
+        u = (row_order(row, rows, first) + u) / rows
+        v = (column_order(number - start, n, second) + v) / n
+    return cell_position(number, count, rows, u, v)
+
+
+@njit(inline="always", cache=True)
+def pixel_position(
+    pattern: Pattern, count: int, rows: int, index: int, first: int, second: int
+) -> tuple[float, float]:
+    """Return a sample's place in its pixel, x right and y down, both in [0, 1)."""
+    if pattern.sampler == CENTER:
+        return 0.5, 0.5
+    return pair_position(pattern, count, rows, index, index, first, second)
+
+
+@njit(inline="always", cache=True)
+def plane_position(
+    pattern: Pattern, count: int, rows: int, index: int, first: int, second: int, order: int
+) -> tuple[float, float]:
+    """Return a sample's point in the unit square of another pair of dimensions (lens, light, direction).
+
+    `order` is the key of the pair's order, `combine(combine(key, dimension), combine(key, dimension + 1))`.
+    """
+    return pair_position(pattern, count, rows, own_order(pattern, count, index, order), index, first, second)
+
+
+@njit(inline="always", cache=True)
+def line_position(pattern: Pattern, count: int, index: int, stream: int, order: int) -> float:
+    """Return a sample's place in [0, 1) in a single dimension (wavelength), stratified in an order of its own."""
+    sampler = pattern.sampler
+    if sampler == RANDOM:
+        return unit(stream, index)
+    number = own_order(pattern, count, index, order)
+    if sampler in (SOBOL, BLUENOISE):
+        return scrambled_unit(sobol_bits(pattern.tables, 0, np.uint32(number)), np.uint32(stream))
     if sampler in (CENTER, GRID):
-        u, v = 0.5, 0.5
-    return cell_position(permute(index, count, combine(first, second)), count, rows, u, v)
+        return (number + 0.5) / count
+    return (number + unit(stream, index)) / count
+
+
+@njit(inline="always", cache=True)
+def shutter_position(pattern: Pattern, count: int, index: int, stream: int, order: int) -> float:
+    """Return a sample's time in the open shutter, [0, 1): as any single dimension, or Sobol's third.
+
+    The centre and grid samplers take the middle of each stratum; one sample is in the middle of the shutter then.
+    """
+    if pattern.sampler == SOBOL:
+        return scrambled_unit(sobol_bits(pattern.tables, 2, np.uint32(index)), np.uint32(stream))
+    return line_position(pattern, count, index, stream, order)
+
+
+@njit(inline="always", cache=True)
+def line_order(key: int, dimension: int) -> np.uint64:
+    """Return the key of a single dimension's order for the pixel whose `pixel_key` is `key`."""
+    return combine(combine(key, dimension), _ORDER)
+
+
+@njit(inline="always", cache=True)
+def plane_order(key: int, dimension: int) -> np.uint64:
+    """Return the key of a pair's order for the pixel whose `pixel_key` is `key`."""
+    return combine(combine(key, dimension), combine(key, dimension + 1))
 
 
 def pattern_frame(reseed: str, frame: int) -> int:
@@ -106,19 +291,27 @@ def pattern_frame(reseed: str, frame: int) -> int:
 
 
 @njit(cache=True)
-def _fill(sampler: int, count: int, key: int, out: FloatArray) -> None:
+def _fill(pattern: Pattern, column: int, row: int, out: FloatArray) -> None:
+    count = pattern.count
     rows = row_count(count)
+    key = pixel_key(pattern.start, column, row)
     for index in range(count):
-        out[index, 0], out[index, 1] = pixel_position(sampler, count, rows, index, key)
-        out[index, 2] = shutter_position(sampler, count, index, key)
-        out[index, 3], out[index, 4] = plane_position(sampler, count, rows, index, key, DIM_LENS)
-        out[index, 5], out[index, 6] = plane_position(sampler, count, rows, index, key, DIM_LIGHT)
+        a, b = stream_keys(pattern, key, column, row, DIM_X)
+        out[index, 0], out[index, 1] = pixel_position(pattern, count, rows, index, a, b)
+        a, _ = stream_keys(pattern, key, column, row, DIM_TIME)
+        out[index, 2] = shutter_position(pattern, count, index, a, line_order(key, DIM_TIME))
+        for pair in (DIM_LENS, DIM_LIGHT, DIM_DIRECTION):
+            a, b = stream_keys(pattern, key, column, row, pair)
+            x, y = plane_position(pattern, count, rows, index, a, b, plane_order(key, pair))
+            out[index, pair], out[index, pair + 1] = x, y
+        a, _ = stream_keys(pattern, key, column, row, DIM_WAVELENGTH)
+        out[index, DIM_WAVELENGTH] = line_position(pattern, count, index, a, line_order(key, DIM_WAVELENGTH))
 
 
 def sample_set(
     name: str, count: int, *, seed: int = 0, frame: int = 0, pixel: tuple[int, int] = (SHARED, SHARED)
 ) -> FloatArray:
-    """Return a whole set, (count, 7) float64 in [0, 1): x, y, time, lens u and v, light u and v.
+    """Return a whole set, (count, 10) in [0, 1): x, y, time, lens u v, light u v, wavelength, direction u v.
 
     Parameters
     ----------
@@ -129,7 +322,13 @@ def sample_set(
     seed, frame : int
     pixel : (column, row)
         Left out, the set that accumulation passes and `pattern=shared` use for all pixels.
+
+    Raises
+    ------
+    InputError
+        For another name.
     """
-    out = np.empty((count, 7))
-    _fill(sampler_code(name), count, pattern_key(seed, frame, pixel[0], pixel[1]), out)
+    out = np.empty((count, DIMENSIONS))
+    pattern = make_pattern(name, count, frame_key(seed, frame), shared=pixel == (SHARED, SHARED))
+    _fill(pattern, pixel[0], pixel[1], out)
     return out

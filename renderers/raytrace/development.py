@@ -1,0 +1,290 @@
+"""How a picture is exposed on film, group of rows after group of rows, and who gets how many samples.
+
+Adaptive sampling (the lecture's: start small, look at the variance, go on to a tolerance) comes in two forms. `pooled`
+looks at a pixel's own samples and goes on while their standard error is too large: efficient and biased, because a
+pixel whose first samples happen to agree stops with them. `unbiased` never lets the number of a pixel's samples depend
+on those samples: it comes from the pilots of the eight neighbours, which see the same edges, and each pixel keeps its
+own pilot. Where neighbours' samples depend on each other (`pattern=shared`, `sampler=bluenoise`) a pilot of its own
+decides instead, and is discarded.
+
+Under wide filters every sample carries 1 / n of its own pixel, so that no pixel counts more for having more samples:
+each pixel's part of a filter integral is estimated by itself. Samples are taken again there once their number is known,
+which costs the pilot twice and memory for nothing but their number.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aliasbench.renderers.raytrace.film import Film, develop_rows, profile_places, profile_table
+from aliasbench.renderers.sampling.filters import FilterSpec, filter_of
+from aliasbench.renderers.sampling.hashing import combine
+from aliasbench.renderers.sampling.patterns import RANDOM, SOBOL, Pattern, make_pattern
+from aliasbench.renderers.sampling.warps import IDENTITY, Warp, make_warp
+from aliasbench.renderers.technique import Technique
+from aliasbench.scenes.errors import InputError
+from aliasbench.scenes.model import FloatArray
+
+CountArray = NDArray[np.int32]
+Expose = Callable[[Pattern, Film], None]
+Progress = Callable[[float], None]
+
+_GROUP_BYTES = 64 << 20
+_MOST_BYTES = 2 << 30
+_PILOT = 0x9110  # what the key of a discarded pilot is derived with
+# Under a filter with lobes few samples can have weights that cancel; the picture then falls back to their sum over the
+# number expected, instead of dividing by nearly nothing. From some ten samples under the filter on it never does.
+_LEAST_WEIGHT = 0.25
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Optics:
+    """What a technique's film is made with: whether samples are splatted, and by which filter or warp."""
+
+    spec: FilterSpec
+    warp: Warp
+    is_splat: bool
+    profile: NDArray[np.float32]
+
+    @property
+    def margin(self) -> int:
+        """How many pixels away a sample still counts."""
+        return self.spec.margin if self.is_splat else 0
+
+    @property
+    def spread(self) -> float:
+        """The side of the square in the middle of a pixel that its samples lie in: none where no filter reaches."""
+        return min(1.0, 2.0 * self.spec.radius) if self.is_splat else 1.0
+
+
+def make_optics(technique: Technique) -> Optics:
+    """Return what a technique's film is made with.
+
+    Raises
+    ------
+    InputError
+        For a filter so wide that a row of its picture does not fit in memory.
+    """
+    spec = filter_of(technique)
+    is_box = technique.filter == "box" and technique.radius_px == 0.5
+    is_splat = technique.weighting == "samples" and not is_box
+    profile = np.zeros(0, np.float32)
+    if is_splat:
+        places = profile_places(spec.radius)
+        values = spec.profile(places) if spec.kind.separable else spec.evaluate(places, 0.0)
+        profile = profile_table(values)
+    return Optics(spec, make_warp(technique), is_splat, profile)
+
+
+def is_plain(technique: Technique) -> bool:
+    """Return whether every pixel takes the same number of samples of equal weight, spread over the pixel alone."""
+    optics = make_optics(technique)
+    return technique.adaptive == "off" and not optics.is_splat and optics.warp.code == IDENTITY
+
+
+@dataclass(slots=True, eq=False)
+class Development:
+    """One picture on its way: what exposes film, with which pattern and optics.
+
+    Attributes
+    ----------
+    technique : Technique
+    size : (width, height)
+    pattern : Pattern
+    optics : Optics
+    expose : callable
+        Adds the samples of a pattern to a film.
+    progress : callable, optional
+        Is told the finished share of the picture.
+    """
+
+    technique: Technique
+    size: tuple[int, int]
+    pattern: Pattern
+    optics: Optics
+    expose: Expose
+    progress: Progress | None = None
+
+    def run(self) -> tuple[NDArray[np.float32], CountArray | None]:
+        """Return the picture (h, w, 3), and the samples of each pixel (h, w) where they differ."""
+        width, height = self.size
+        margin = self.optics.margin
+        taps = 2 * margin + 1
+        row_bytes = (width + 2 * margin) * (96 if not self.optics.is_splat else 32 * taps + 96)
+        if row_bytes * (taps + 1) > _MOST_BYTES:
+            raise InputError(
+                f"radius={self.technique.radius_px:g}: a picture {width} pixels wide under so wide a filter needs more "
+                f"than {_MOST_BYTES >> 30} GB; a smaller radius or picture does not"
+            )
+        group = max(1, min(height + 2 * margin, _GROUP_BYTES // row_bytes))
+        out = np.zeros((height, width, 3), np.float32)
+        counts = None if self.technique.adaptive == "off" else np.zeros((height, width), np.int32)
+        window, top = np.zeros((0, width, 4)), 0  # image rows from `top` on that rows of samples still add to
+        for first in range(-margin, height + margin, group):
+            after = min(first + group, height + margin)
+            if counts is None:
+                shape = (after - first, width + 2 * margin)
+                numbers, film = np.full(shape, self.pattern.count, np.int32), None
+                passes = [(np.zeros(shape, np.int32), numbers)]
+            else:
+                film, numbers, passes = self._adapt(first, after)
+                inside = slice(max(first, 0) - first, min(after, height) - first)
+                extra = self.technique.min_spp if self._discards else 0
+                counts[max(first, 0) : min(after, height)] = numbers[inside, margin : margin + width] + extra
+            if self.optics.is_splat:
+                rows = min(after + margin, height) - top
+                window = np.concatenate([window, np.zeros((max(rows - len(window), 0), width, 4))])
+                self._splat(first, passes, numbers, window, top)
+                done = min(after - margin, height) - top if after < height + margin else height - top
+                if done > 0:
+                    out[top : top + done] = self._resolve(window[:done])
+                    window, top = window[done:].copy(), top + done
+            else:
+                if film is None:
+                    film = self._film(first, -margin, *passes[0], sums=True)
+                    self.expose(self.pattern, film)
+                means = film.sums / numbers[..., None]
+                out[first:after] = film.shifts + means if film.shifts.size else means
+            if self.progress is not None:
+                self.progress((after + margin) / (height + 2 * margin))
+        return out, counts
+
+    @property
+    def _discards(self) -> bool:
+        """Whether pilots are discarded (see the module)."""
+        shares = self.pattern.shared or self.pattern.sampler > SOBOL
+        return self.technique.adaptive == "unbiased" and shares
+
+    def _film(
+        self, row: int, column: int, begins: CountArray, ends: CountArray, *, sums: bool = False, squares: bool = False,
+        numbers: CountArray | None = None,
+    ) -> Film:  # fmt: skip
+        """Return a film for sums, with or without squares, or for splats of samples that weigh 1 / `numbers`."""
+        rows, columns = begins.shape
+        optics = self.optics
+        empty = np.zeros((0, 0, 0))
+        taps = 2 * optics.margin + 1
+        return Film(
+            row,
+            column,
+            begins,
+            ends,
+            np.zeros((rows, columns, 3)) if squares else empty,
+            np.zeros((rows, columns, 3)) if sums else empty,
+            np.zeros((rows, columns, 3)) if squares else empty,
+            np.zeros((0, 0)) if numbers is None else 1.0 / numbers,
+            np.zeros((0, 0, 0, 0)) if numbers is None else np.zeros((rows, taps, self.size[0], 4)),
+            optics.margin,
+            optics.spec.radius,
+            optics.spread,
+            not optics.spec.kind.separable,
+            optics.profile,
+            optics.warp,
+        )
+
+    def _splat(
+        self, row: int, passes: list[tuple[CountArray, CountArray]], numbers: CountArray, window: FloatArray, top: int
+    ) -> None:
+        """Add rows of samples, taken in passes, to the window."""
+        film = self._film(row, -self.optics.margin, *passes[0], numbers=numbers)
+        for begins, ends in passes:
+            self.expose(self.pattern, film._replace(begins=begins, ends=ends))
+        develop_rows(film.splats, row, window, top)
+
+    def _resolve(self, window: FloatArray) -> FloatArray:
+        """Return the colours of finished rows of a window."""
+        weights = window[..., 3:]
+        if self.optics.spec.gain > 1.0:
+            # samples weigh 1 / n over the square that they are spread over, and the filter's integral is 1
+            expected = self.optics.spread**-2
+            return window[..., :3] / np.where(weights < _LEAST_WEIGHT * expected, expected, weights)
+        return np.divide(window[..., :3], weights, out=np.zeros_like(window[..., :3]), where=weights > 0.0)
+
+    def _adapt(self, first: int, after: int) -> tuple[Film, CountArray, list[tuple[CountArray, CountArray]]]:
+        """Return rows of film with the sums of all samples, their numbers, and the passes they were taken in."""
+        t, margin = self.technique, self.optics.margin
+        ring = 1 if t.adaptive == "unbiased" else 0
+        shape = (after - first + 2 * ring, self.size[0] + 2 * (margin + ring))
+        begins, ends = np.zeros(shape, np.int32), np.full(shape, t.min_spp, np.int32)
+        film = self._film(first - ring, -margin - ring, begins, ends, sums=True, squares=True)
+        pattern = self.pattern
+        if self._discards:
+            name = "random" if pattern.sampler == RANDOM else "sobol"
+            start = int(combine(pattern.start, _PILOT))
+            pattern = make_pattern(name, t.max_spp, start, shared=False, progressive=True)
+        self.expose(pattern, film)
+        if t.adaptive == "pooled":
+            return self._pool(film, ends)
+        needed = self._needed(film, ends)
+        inner = (slice(ring, -ring), slice(ring, -ring))
+        if self._discards:
+            numbers = needed
+            begins, own = np.zeros_like(numbers), self._film(first, -margin, begins, ends, sums=True, squares=True)
+        else:
+            numbers = needed
+            begins = np.minimum(ends[inner], numbers)
+            kept = (np.ascontiguousarray(a[inner]) for a in (film.shifts, film.sums, film.squares))
+            own = self._film(first, -margin, begins, numbers)._replace(
+                **dict(zip(("shifts", "sums", "squares"), kept, strict=True))
+            )
+        own = own._replace(begins=begins, ends=numbers)
+        if not self.optics.is_splat:
+            self.expose(self.pattern, own)
+        passes = [(begins, numbers)]
+        if not self._discards:
+            passes = [(np.zeros_like(begins), begins), (begins, numbers)]
+        return own, numbers, passes
+
+    def _pool(self, film: Film, numbers: CountArray) -> tuple[Film, CountArray, list[tuple[CountArray, CountArray]]]:
+        """Take more samples, until their standard error is within the tolerance or there are as many as allowed."""
+        t = self.technique
+        passes = [(film.begins, film.ends)]
+        while True:
+            wanted = self._wanted(_variances(film, numbers), numbers)
+            more = (wanted > numbers) & (numbers < t.max_spp)
+            if not more.any():
+                return film, numbers, passes
+            ends = np.where(more, np.minimum(np.minimum(wanted, 2 * numbers), t.max_spp), numbers).astype(np.int32)
+            self.expose(self.pattern, film._replace(begins=numbers, ends=ends))
+            passes.append((numbers, ends))
+            numbers = ends
+
+    def _wanted(self, variances: FloatArray, numbers: CountArray) -> NDArray[np.int64]:
+        """Return how many samples bring the standard error to the tolerance; twice as many where none can be told."""
+        with np.errstate(over="ignore"):
+            wanted = np.ceil(variances / self.technique.tolerance**2 - 1e-9)
+        wanted = np.where(numbers < 2, 2 * numbers, wanted)
+        return np.clip(wanted, self.technique.min_spp, self.technique.max_spp).astype(np.int64)
+
+    def _needed(self, film: Film, numbers: CountArray) -> CountArray:
+        """Return the numbers of samples inside the film's outermost ring that the pilots of neighbours ask for.
+
+        Discarded pilots ask for their own pixel too. From single samples the variance between neighbours is all there
+        is to see.
+        """
+        rows, columns = numbers.shape
+        shifts = [
+            (slice(1 + i, rows - 1 + i), slice(1 + j, columns - 1 + j))
+            for i in (-1, 0, 1)
+            for j in (-1, 0, 1)
+            if (i, j) != (0, 0) or self._discards
+        ]
+        if self.technique.min_spp == 1:
+            values = np.stack([film.shifts[s] for s in shifts])
+            variances = values.var(axis=0, ddof=1).max(axis=-1)
+        else:
+            own = _variances(film, numbers)
+            variances = np.stack([own[s] for s in shifts]).max(axis=0)
+        enough = np.full(variances.shape, 2, np.int32)
+        return self._wanted(variances, enough).astype(np.int32)
+
+
+def _variances(film: Film, numbers: CountArray) -> FloatArray:
+    """Return the largest variance of the channels of each pixel's samples, infinite of a single one."""
+    n = numbers[..., None].astype(np.float64)
+    spare = np.where(n > 1, n - 1, math.inf)
+    variances: FloatArray = (np.maximum(film.squares - film.sums**2 / n, 0.0) / spare).max(axis=-1)
+    return np.where(numbers > 1, variances, math.inf)

@@ -1,0 +1,254 @@
+"""The kernels: they make 16 rays, have Embree trace them, and shade them, row after row on every thread.
+
+What a scene does not need costs it nothing, so there are several: still and flat, still and textured, moving; the same
+onto a film, for filters, warps and adaptive sampling; and one for light that is scattered. Threads take rows from one
+shared counter, so none waits for another, and a pixel depends on nothing but its own samples (or, splatted, on rows in
+a fixed order): the picture is the same bit for bit on any number of threads.
+"""
+
+from typing import Any, NamedTuple
+
+import llvmlite.binding
+import numpy as np
+from llvmlite import ir
+from numba import njit, types
+from numba.extending import intrinsic
+from numpy.typing import NDArray
+
+from aliasbench.renderers.raytrace.blurs import fill_film_lens, fill_film_times, picture_reach
+from aliasbench.renderers.raytrace.bodies import fill_body_rays, may_see, to_body
+from aliasbench.renderers.raytrace.embree import library_path, load_library
+from aliasbench.renderers.raytrace.film import Film, add_runs, next_runs, place_runs
+from aliasbench.renderers.raytrace.lanes import (
+    HIT_GEOM,
+    HIT_INSTANCE,
+    HIT_PRIM,
+    LANES,
+    LENS_RADIUS,
+    RAY_TFAR,
+    fill_moving_rays,
+    fill_rays,
+)
+from aliasbench.renderers.raytrace.pixel_sums import add_samples
+from aliasbench.renderers.raytrace.positions import KeyArray, fill_columns, fill_keys, fill_positions, fill_times
+from aliasbench.renderers.raytrace.shading import MISS, Tables, shade_flat, shade_textured
+from aliasbench.renderers.sampling.patterns import Pattern
+from aliasbench.scenes.model import FloatArray
+
+IntArray = NDArray[np.int32]
+CountArray = NDArray[np.int64]
+
+# TBB first, then Embree's own symbols, where compiled kernels (cached ones too) look for rtcIntersect16.
+load_library()
+llvmlite.binding.load_library_permanently(str(library_path()))
+
+# A ctypes pointer would do the same, but kernels with one cannot be cached.
+intersect16 = types.ExternalFunction("rtcIntersect16", types.void(types.intp, types.intp, types.intp, types.intp))
+
+NOTHING = -1  # Embree's invalid id, as int32
+
+
+@intrinsic
+def take_next(typing_context: Any, counter: Any) -> Any:  # noqa: ARG001 - numba passes it
+    """Return the int64 at the start of an array and raise it by one, in one step that no other thread can split."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        array = context.make_array(signature.args[0])(context, builder, arguments[0])
+        return builder.atomic_rmw("add", array.data, ir.Constant(ir.IntType(64), 1), "monotonic")
+
+    return types.int64(counter), generate
+
+
+class Workspace(NamedTuple):
+    """One thread's memory, aligned as Embree needs it; `holes` only keeps alive what `arguments` point to.
+
+    `orders`, `numbers`, `runs`, `cursor`, `weights` and `taps` are what `positions` and `film` ask for.
+    """
+
+    scratch: FloatArray
+    ray: NDArray[np.float32]
+    ray_ids: IntArray
+    body_ray: NDArray[np.float32]
+    body_ids: IntArray
+    valid: IntArray
+    arguments: IntArray
+    hits: IntArray
+    sums: FloatArray
+    keys: KeyArray
+    orders: IntArray
+    numbers: CountArray
+    runs: CountArray
+    cursor: CountArray
+    weights: FloatArray
+    taps: FloatArray
+    holes: CountArray
+
+
+@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+def trace(scene: int, work: Workspace, lanes: int) -> None:
+    """Find the nearest hits on the mesh that stands still, MISS where there is none."""
+    for i in range(LANES):
+        work.ray[RAY_TFAR + i] = np.inf
+        work.ray_ids[HIT_GEOM + i] = NOTHING
+        work.ray_ids[HIT_INSTANCE + i] = NOTHING
+        work.ray_ids[HIT_PRIM + i] = MISS
+    for i in range(LANES):
+        work.valid[i] = -1 if i < lanes else 0
+    intersect16(work.valid.ctypes.data, scene, work.ray.ctypes.data, work.arguments.ctypes.data)
+    for i in range(LANES):
+        work.hits[i] = work.ray_ids[HIT_PRIM + i]
+
+
+@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+def trace_bodies(
+    scenes: CountArray, tables: Tables, work: Workspace, left: float, right: float, top: float, bottom: float
+) -> None:
+    """Find nearer hits on the bodies that move and may be seen there in the picture, each in its own frame."""
+    for body in range(len(scenes)):
+        if not may_see(tables.bodies[body], left, right, top, bottom):
+            continue
+        to_body(tables.bodies[body], work.scratch)
+        fill_body_rays(work.scratch, work.ray, work.body_ray)
+        for i in range(LANES):
+            work.body_ids[HIT_GEOM + i] = NOTHING
+            work.body_ids[HIT_INSTANCE + i] = NOTHING
+        intersect16(work.valid.ctypes.data, scenes[body], work.body_ray.ctypes.data, work.arguments.ctypes.data)
+        first = np.int32(tables.firsts[body])
+        for i in range(LANES):
+            if work.body_ids[HIT_GEOM + i] != NOTHING:
+                work.hits[i] = first + work.body_ids[HIT_PRIM + i]
+                work.ray[RAY_TFAR + i] = work.body_ray[RAY_TFAR + i]
+
+
+@njit(nogil=True, cache=True, error_model="numpy", _nrt=False)
+def render_static_flat(
+    scene: int, camera: FloatArray, pattern: Pattern, tables: Tables, work: Workspace,
+    counter: CountArray, out: NDArray[np.float32],
+) -> None:  # fmt: skip
+    """Render rows until there are none left: nothing moves, no textures."""
+    fill_columns(pattern, 0, work.keys)
+    while True:
+        row = take_next(counter)
+        if row >= out.shape[0]:
+            return
+        fill_keys(pattern, 0, row, work.keys)
+        samples = out.shape[1] * pattern.count
+        for first in range(0, samples, LANES):
+            lanes = min(LANES, samples - first)
+            fill_positions(pattern, work.keys, row, first, lanes, work.orders, work.scratch)
+            fill_rays(camera, work.scratch, work.ray)
+            trace(scene, work, lanes)
+            shade_flat(tables, work.hits, work.scratch)
+            add_samples(pattern.count, row, first, lanes, work.scratch, work.sums, out)
+
+
+@njit(nogil=True, cache=True, error_model="numpy", _nrt=False)
+def render_static_textured(
+    scene: int, camera: FloatArray, pattern: Pattern, tables: Tables, work: Workspace,
+    counter: CountArray, out: NDArray[np.float32],
+) -> None:  # fmt: skip
+    """Render rows until there are none left: nothing moves."""
+    fill_columns(pattern, 0, work.keys)
+    while True:
+        row = take_next(counter)
+        if row >= out.shape[0]:
+            return
+        fill_keys(pattern, 0, row, work.keys)
+        samples = out.shape[1] * pattern.count
+        for first in range(0, samples, LANES):
+            lanes = min(LANES, samples - first)
+            fill_positions(pattern, work.keys, row, first, lanes, work.orders, work.scratch)
+            fill_rays(camera, work.scratch, work.ray)
+            trace(scene, work, lanes)
+            shade_textured(tables, camera, work.hits, work.scratch)
+            add_samples(pattern.count, row, first, lanes, work.scratch, work.sums, out)
+
+
+@njit(nogil=True, cache=True, error_model="numpy", _nrt=False)
+def render_moving(
+    scene: int, scenes: CountArray, camera: FloatArray, pattern: Pattern, tables: Tables, work: Workspace,
+    counter: CountArray, out: NDArray[np.float32],
+) -> None:  # fmt: skip
+    """Render rows until there are none left: every sample has a time of its own."""
+    textured = len(tables.triangles) > 0
+    fill_columns(pattern, 0, work.keys)
+    while True:
+        row = take_next(counter)
+        if row >= out.shape[0]:
+            return
+        fill_keys(pattern, 0, row, work.keys)
+        samples = out.shape[1] * pattern.count
+        for first in range(0, samples, LANES):
+            lanes = min(LANES, samples - first)
+            fill_positions(pattern, work.keys, row, first, lanes, work.orders, work.scratch)
+            fill_times(pattern, work.keys, row, first, lanes, work.numbers, work.scratch)
+            fill_moving_rays(camera, work.scratch, work.ray)
+            trace(scene, work, lanes)
+            left, right = first // pattern.count, (first + lanes - 1) // pattern.count + 1
+            trace_bodies(scenes, tables, work, float(left), float(right), float(row), row + 1.0)
+            if textured:
+                shade_textured(tables, camera, work.hits, work.scratch)
+            else:
+                shade_flat(tables, work.hits, work.scratch)
+            add_samples(pattern.count, row, first, lanes, work.scratch, work.sums, out)
+
+
+@njit(nogil=True, cache=True, error_model="numpy", _nrt=False)
+def film_static(
+    scene: int, camera: FloatArray, pattern: Pattern, tables: Tables, work: Workspace, counter: CountArray, film: Film
+) -> None:
+    """Expose the film's rows until there are none left: nothing moves, and there is no lens."""
+    textured = len(tables.triangles) > 0
+    fill_columns(pattern, film.column, work.keys)
+    while True:
+        r = take_next(counter)
+        if r >= film.begins.shape[0]:
+            return
+        fill_keys(pattern, film.column, film.row + r, work.keys)
+        work.cursor[:] = 0
+        while True:
+            lanes, runs = next_runs(film, r, work.cursor, work.runs)
+            if lanes == 0:
+                break
+            place_runs(pattern, film, work.keys, r, work.runs, runs, work.orders, work.scratch)
+            fill_rays(camera, work.scratch, work.ray)
+            trace(scene, work, lanes)
+            if textured:
+                shade_textured(tables, camera, work.hits, work.scratch)
+            else:
+                shade_flat(tables, work.hits, work.scratch)
+            add_runs(film, r, work.runs, runs, work.weights, work.taps, work.scratch)
+
+
+@njit(nogil=True, cache=True, error_model="numpy", _nrt=False)
+def film_moving(
+    scene: int, scenes: CountArray, camera: FloatArray, pattern: Pattern, tables: Tables, work: Workspace,
+    counter: CountArray, film: Film,
+) -> None:  # fmt: skip
+    """Expose the film's rows until there are none left: samples have times of their own, and points on the lens."""
+    textured = len(tables.triangles) > 0
+    fill_columns(pattern, film.column, work.keys)
+    while True:
+        r = take_next(counter)
+        if r >= film.begins.shape[0]:
+            return
+        row = film.row + r
+        fill_keys(pattern, film.column, row, work.keys)
+        work.cursor[:] = 0
+        while True:
+            lanes, runs = next_runs(film, r, work.cursor, work.runs)
+            if lanes == 0:
+                break
+            place_runs(pattern, film, work.keys, r, work.runs, runs, work.orders, work.scratch)
+            fill_film_times(pattern, film, work.keys, r, work.runs, runs, work.numbers, work.scratch)
+            if camera[LENS_RADIUS] > 0.0:
+                radius = camera[LENS_RADIUS]
+                fill_film_lens(pattern, film, work.keys, r, work.runs, runs, work.numbers, radius, work.scratch)
+            fill_moving_rays(camera, work.scratch, work.ray)
+            trace(scene, work, lanes)
+            trace_bodies(scenes, tables, work, *picture_reach(work.scratch, lanes))
+            if textured:
+                shade_textured(tables, camera, work.hits, work.scratch)
+            else:
+                shade_flat(tables, work.hits, work.scratch)
+            add_runs(film, r, work.runs, runs, work.weights, work.taps, work.scratch)

@@ -1,0 +1,247 @@
+"""The places of a packet's samples, 16 at a time: `sampling.patterns` as the compiler vectorises it.
+
+Samples of a row are numbered pixel after pixel, and every 16 of them are one packet. With 16 samples a pixel (or a
+multiple) a packet is of one pixel, which Embree traces three times faster than 16 pixels; with fewer it holds whole
+neighbours, and any count wastes lanes only at the end of a row. What depends on a pixel alone (keys, the orders of
+multijittered rows and columns) is computed once for it.
+"""
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from aliasbench.renderers.raytrace.lanes import LANES, PX, PY, TIME
+from aliasbench.renderers.sampling.hashing import SHARED, combine, permute_power, unit
+from aliasbench.renderers.sampling.patterns import (
+    BLUENOISE,
+    CENTER,
+    DIM_TIME,
+    DIM_X,
+    GRID,
+    MULTIJITTERED,
+    RANDOM,
+    SOBOL,
+    Pattern,
+    column_order,
+    line_order,
+    own_order,
+    pair_position,
+    plane_order,
+    row_count,
+    row_order,
+    stream_keys,
+)
+from aliasbench.renderers.sampling.sobol import TABLE_BITS, scrambled_unit, sobol_bits
+from aliasbench.scenes.model import FloatArray
+
+KeyArray = NDArray[np.uint64]
+
+# Over every sample number (2^24 at most): tells the compiler that none is negative, which spares a check for each lane.
+INDEX_MASK = 0x1FFFFFF
+_SHORT = 1 << TABLE_BITS
+BATCH = 0x5A17  # what the keys of a pixel's later samples are derived with
+
+# Rows of the keys of a row's pixels: of the pixel, of the streams of x and y, and what columns start from.
+PIXEL, FIRST, SECOND, COLUMN, KEY_ROWS = 0, 1, 2, 3, 4
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def fill_columns(pattern: Pattern, first_column: int, keys: KeyArray) -> None:
+    """Write what the keys of a column's pixels start from, once for a picture: `keys` (KEY_ROWS, width), last row."""
+    for k in range(keys.shape[1]):
+        keys[COLUMN, k] = combine(pattern.start, SHARED if pattern.shared else first_column + k)
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def fill_keys(pattern: Pattern, first_column: int, row: int, keys: KeyArray) -> None:
+    """Write the keys of a row's pixels: `keys` (KEY_ROWS, width) gets those of the pattern and of its x and y.
+
+    They are a chain of hashes, which costs less done for many pixels at once than on the way to each packet.
+    `hashing.pixel_key` and `patterns.stream_keys` are the definition.
+    """
+    value = SHARED if pattern.shared else row
+    for k in range(keys.shape[1]):
+        keys[PIXEL, k] = combine(keys[COLUMN, k], value)
+    for k in range(keys.shape[1]):
+        keys[FIRST, k], keys[SECOND, k] = stream_keys(pattern, keys[PIXEL, k], first_column + k, row, DIM_X)
+
+
+def orders_size(pattern: Pattern) -> int:
+    """Return how many columns the array of `_fill_orders` needs."""
+    return max(row_count(pattern.count), pattern.count // row_count(pattern.count) + 1)
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def _fill_orders(pattern: Pattern, first: int, second: int, orders: NDArray[np.int32]) -> None:
+    """Write one pixel's orders of multijittered rows, and of columns in rows of the two lengths."""
+    rows = row_count(pattern.count)
+    shortest = pattern.count // rows
+    for k in range(rows):
+        orders[0, k] = row_order(k, rows, first)
+    for longer in range(2 if shortest * rows < pattern.count else 1):
+        for k in range(shortest + longer):
+            orders[1 + longer, k] = column_order(k, shortest + longer, second)
+
+
+@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+def fill_run(
+    pattern: Pattern, keys: KeyArray, place: int, index: int, lane: int, run: int, left: float, top: float,
+    orders: NDArray[np.int32], scratch: FloatArray,
+) -> None:  # fmt: skip
+    """Write image positions of `run` samples of one whole set from sample `index` on, in lanes from `lane` on.
+
+    The pixel is the one whose keys are at `place`; `left` and `top` are where it starts in the image. `orders` (3, n)
+    keeps its orders from one packet to the next.
+    """
+    sampler = pattern.sampler
+    if sampler in (CENTER, GRID):
+        for k in range(run):
+            i = (index + k) & INDEX_MASK
+            scratch[PX + lane + k] = left + pattern.cells[0, i]
+            scratch[PY + lane + k] = top + pattern.cells[1, i]
+        return
+    first, second = keys[FIRST, place], keys[SECOND, place]
+    if sampler >= SOBOL:
+        key_x, key_y = np.uint32(first), np.uint32(second)
+        if index + run <= _SHORT:
+            for k in range(run):
+                i = (index + k) & INDEX_MASK
+                scratch[PX + lane + k] = left + scrambled_unit(pattern.tables[0, 0, i], key_x)
+                scratch[PY + lane + k] = top + scrambled_unit(pattern.tables[0, 1, i], key_y)
+            return
+        for k in range(run):
+            word = np.uint32(index + k)
+            scratch[PX + lane + k] = left + scrambled_unit(sobol_bits(pattern.tables, 0, word), key_x)
+            scratch[PY + lane + k] = top + scrambled_unit(sobol_bits(pattern.tables, 1, word), key_y)
+        return
+    if sampler == MULTIJITTERED:
+        if index == 0:
+            _fill_orders(pattern, first, second, orders)
+        rows = row_count(pattern.count)
+        shortest = pattern.count // rows
+        for k in range(run):
+            i = (index + k) & INDEX_MASK
+            column, longer = pattern.places[1, i], pattern.places[2, i]
+            u = (orders[0, pattern.places[0, i]] + unit(first, i)) / rows
+            v = (orders[1 + longer, column] + unit(second, i)) / (shortest + longer)
+            scratch[PX + lane + k] = left + (pattern.cells[0, i] + pattern.cells[2, i] * u)
+            scratch[PY + lane + k] = top + (pattern.cells[1, i] + pattern.cells[3, i] * v)
+        return
+    for k in range(run):
+        i = (index + k) & INDEX_MASK
+        scratch[PX + lane + k] = left + (pattern.cells[0, i] + pattern.cells[2, i] * unit(first, i))
+    for k in range(run):
+        i = (index + k) & INDEX_MASK
+        scratch[PY + lane + k] = top + (pattern.cells[1, i] + pattern.cells[3, i] * unit(second, i))
+
+
+@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+def fill_positions(
+    pattern: Pattern, keys: KeyArray, row: int, first: int, lanes: int, orders: NDArray[np.int32], scratch: FloatArray
+) -> None:
+    """Write the image positions of `lanes` samples of a row from its sample number `first` on."""
+    column = first // pattern.count
+    index = (first - column * pattern.count) & INDEX_MASK
+    if pattern.count - index >= LANES:
+        # A loop of constant length is what the compiler vectorises best, and this is the common case.
+        fill_run(pattern, keys, column, index, 0, LANES, float(column), float(row), orders, scratch)
+        return
+    lane = 0
+    while lane < lanes:
+        run = min(lanes - lane, pattern.count - index)
+        fill_run(pattern, keys, column, index, lane, run, float(column), float(row), orders, scratch)
+        lane += run
+        column, index = column + 1, 0
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def _fill_numbers(
+    pattern: Pattern, count: int, index: int, lane: int, run: int, order: int, numbers: NDArray[np.int64]
+) -> None:
+    """Write which points of another dimension's set belong to `run` samples from `index` on; see `own_order`."""
+    sampler = pattern.sampler
+    is_sequence = sampler == SOBOL or (sampler == BLUENOISE and pattern.progressive)
+    if not is_sequence and sampler != RANDOM and count & (count - 1) == 0:
+        mask, key = np.uint32(count - 1), np.uint32(order)
+        for k in range(run):
+            numbers[lane + k] = np.int64(permute_power((index + k) & INDEX_MASK, mask, key))
+        return
+    for k in range(run):
+        numbers[lane + k] = own_order(pattern, count, index + k, order)
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def fill_line(
+    pattern: Pattern, count: int, key: int, column: int, row: int, dimension: int, index: int, lane: int, run: int,
+    numbers: NDArray[np.int64], scratch: FloatArray, at: int,
+) -> None:  # fmt: skip
+    """Write at `at` the places in one dimension of `run` samples of a pixel, of a set of `count`; see `line_position`.
+
+    `key` is the pixel's, `numbers` (LANES,) room for the points' numbers.
+    """
+    stream, _ = stream_keys(pattern, key, column, row, dimension)
+    sampler = pattern.sampler
+    if sampler == RANDOM:
+        for k in range(run):
+            scratch[at + lane + k] = unit(stream, (index + k) & INDEX_MASK)
+        return
+    if sampler == SOBOL and dimension == DIM_TIME:
+        for k in range(run):
+            word = np.uint32(index + k)
+            scratch[at + lane + k] = scrambled_unit(sobol_bits(pattern.tables, 2, word), np.uint32(stream))
+        return
+    _fill_numbers(pattern, count, index, lane, run, line_order(key, dimension), numbers)
+    if sampler >= SOBOL:
+        for k in range(run):
+            word = np.uint32(numbers[lane + k])
+            scratch[at + lane + k] = scrambled_unit(sobol_bits(pattern.tables, 0, word), np.uint32(stream))
+    elif sampler in (CENTER, GRID):
+        for k in range(run):
+            scratch[at + lane + k] = (numbers[lane + k] + 0.5) / count
+    else:
+        for k in range(run):
+            scratch[at + lane + k] = (numbers[lane + k] + unit(stream, (index + k) & INDEX_MASK)) / count
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def fill_plane(
+    pattern: Pattern, count: int, key: int, column: int, row: int, dimension: int, index: int, step: int, lane: int,
+    run: int, numbers: NDArray[np.int64], scratch: FloatArray, at_u: int, at_v: int,
+) -> None:  # fmt: skip
+    """Write at `at_u`, `at_v` the points in a pair of dimensions of `run` samples, of a set of `count`.
+
+    The samples are index, index + step, ...; see `plane_position`, and `fill_line` for the other parameters.
+    """
+    first, second = stream_keys(pattern, key, column, row, dimension)
+    order = plane_order(key, dimension)
+    rows = row_count(count)
+    if step == 1:
+        _fill_numbers(pattern, count, index, lane, run, order, numbers)
+    else:
+        for k in range(run):
+            numbers[lane + k] = own_order(pattern, count, index + k * step, order)
+    if pattern.sampler >= SOBOL:
+        for k in range(run):
+            word = np.uint32(numbers[lane + k])
+            scratch[at_u + lane + k] = scrambled_unit(sobol_bits(pattern.tables, 0, word), np.uint32(first))
+            scratch[at_v + lane + k] = scrambled_unit(sobol_bits(pattern.tables, 1, word), np.uint32(second))
+        return
+    for k in range(run):
+        u, v = pair_position(pattern, count, rows, numbers[lane + k], index + k * step, first, second)
+        scratch[at_u + lane + k], scratch[at_v + lane + k] = u, v
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def fill_times(
+    pattern: Pattern, keys: KeyArray, row: int, first: int, lanes: int, numbers: NDArray[np.int64], scratch: FloatArray
+) -> None:
+    """Write the shutter positions of `lanes` samples of a row from its sample number `first` on."""
+    count = pattern.count
+    column, index = first // count, first % count
+    lane = 0
+    while lane < lanes:
+        run = min(lanes - lane, count - index)
+        key = keys[PIXEL, column]
+        fill_line(pattern, count, key, column, row, DIM_TIME, index, lane, run, numbers, scratch, TIME)
+        lane += run
+        column, index = column + 1, 0

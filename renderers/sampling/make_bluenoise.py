@@ -1,0 +1,329 @@
+"""Makes the tiles of `bluenoise`: `python -m aliasbench.renderers.sampling.make_bluenoise` writes its data file.
+
+The errors to be made blue are those of half spaces n.l - a.x < t over the second pair's point l and the place x in the
+pixel, both about the squares' centres. Over the picture t grows by a.p, since the edge does not move with the pixel:
+|n| = 1 and |a| is one over the border's width in pixels. In t, the error of a set is a Fourier series with terms
+
+    E_w = (mean of exp(-i w (n.l - a.x)) over the set - the same over both squares) / (i w),
+
+and the blurred error's mean square over all t of an edge is the sum over w of |sum_q g(p - q) E_w(q) exp(i w a.q)|^2.
+With G = g * g and K_w(d) = G(d) exp(-i w a.d) the energy to be minimised is the sum over pixels p, q and over terms (edges and
+w) of conj(E_w(p)) K_w(p - q) E_w(q). Metropolis' algorithm changes one field of one pixel's keys at a time; the blurred
+terms h = K E are kept, so that a proposal costs only the new E of one pixel.
+
+The energy alone would also prefer sets with small errors of their own. A multiple of the sum of |E|^2 is subtracted, and
+adjusted after every sweep so that the mean square stays that of random keys: the sampler's error is neither helped nor
+harmed. The means over the tile vanish with the lowest frequency.
+
+The same machine and libraries give the same file; others may round differently and end in another tile as good.
+"""
+
+import math
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from aliasbench.renderers.sampling.bluenoise import (
+    CLASSES,
+    DATA,
+    FIELDS,
+    LEVELS,
+    ORDER,
+    OWN,
+    SIDE,
+    WORDS,
+    fill_pair,
+    words_of,
+)
+from aliasbench.renderers.sampling.hashing import combine, mix32, unit
+from aliasbench.renderers.sampling.sobol import WordArray, sobol_tables
+from aliasbench.scenes.model import FloatArray
+
+Single = NDArray[np.float32]
+Fields = NDArray[np.uint16]
+
+BLUR_PX = 1.0
+REACH = 4  # of the kernel; G has fallen to e^-4 of its peak there
+WIDEST, NARROWEST = 0.05, 0.25  # |a|: borders of 20 and 4 pixels
+STRETCH = 1.6  # of a against n, for slanted surfaces
+HOT, COLD = 0.05, 0.001  # temperatures, relative to what a random change costs at first
+PHASES = 8192  # steps of a turn in the table of exponentials
+COARSE = 256.0  # points are known to 8 bits
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """How one tile is made.
+
+    Attributes
+    ----------
+    fields : tuple of int
+        Which fields of `words_of` are free.
+    terms : int
+        Of each edge's series.
+    mirrored : float
+        Weight of errors of edges that move over the second pair in other than the picture's direction.
+    sweeps : int
+        Proposals for each pixel.
+    """
+
+    fields: tuple[int, ...]
+    terms: int
+    mirrored: float
+    sweeps: int
+
+
+_ONE_KEY, _ALL_KEYS = (0, 1, 2, 3, FIELDS - 1), tuple(range(FIELDS))
+# With few samples a pixel's error has few degrees of freedom, and all directions can be had at once.
+PLANS = {
+    1: Plan((0, 1, 2, 3), 8, 1.0, 150),
+    2: Plan(_ONE_KEY, 8, 1.0, 200),
+    4: Plan(_ALL_KEYS, 8, 0.6, 400),
+    8: Plan(_ALL_KEYS, 10, 0.0, 500),
+    16: Plan(_ALL_KEYS, 12, 0.0, 900),
+    32: Plan(_ONE_KEY, 12, 0.0, 120),
+}
+EDGES = 32
+
+
+def edge_family(mirrored: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return normals n (edges, 2), slopes a (edges, 2) and weights (edges,), spread evenly over what edges may be."""
+    golden, plastic = 0.6180339887498949, 0.7548776662466927
+    k = np.arange(EDGES)
+    angle = math.pi * (k + 0.5) / EDGES
+    n = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    size = WIDEST * (NARROWEST / WIDEST) ** (k * golden % 1.0)
+    ratio = STRETCH ** (k * plastic % 1.0 - 0.5)
+    a = n * np.stack([size * ratio, size / ratio], axis=1)
+    if mirrored == 0.0:
+        return n, a, np.ones(EDGES)
+    signs = np.array([(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0)])[k % 3]
+    return np.concatenate([n, n]), np.concatenate([a, a * signs]), np.repeat([1.0, mirrored], EDGES)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Series:
+    """Terms of the edges' errors; a term's index is frequency * edges + edge.
+
+    Attributes
+    ----------
+    direction : (4, edges) float32
+        n.l - a.x in turns of the lowest frequency, over the coordinates (x, l).
+    scale, mean : (terms,) float32
+        The factor of a term and its expectation before it.
+    kernel : (2, 2 REACH + 1, 2 REACH + 1, terms) float32
+        K by parts, rows and columns.
+    """
+
+    direction: Single
+    scale: Single
+    mean: Single
+    kernel: Single
+
+
+def make_series(plan: Plan) -> Series:
+    """Return the terms that a plan's tile is made for."""
+    n, a, weight = edge_family(plan.mirrored)
+    vector = np.concatenate([-a, n], axis=1)
+    period = np.abs(vector).sum(axis=1)  # outside of it all or nothing is inside the edge
+    turns = np.arange(1, plan.terms + 1)[:, None] / period
+    mean = np.sinc(turns[:, :, None] * vector).prod(axis=2)
+    scale = weight / (2.0 * math.pi * turns * np.sqrt(period))
+    d = np.arange(-REACH, REACH + 1)
+    blur = np.exp(-(d[:, None] ** 2 + d**2) / (4.0 * BLUR_PX**2)) / (4.0 * math.pi * BLUR_PX**2)
+    motion = d[None, :, None] * a[:, 0] + d[:, None, None] * a[:, 1]
+    kernel = blur[:, :, None, None] * np.exp(-2j * math.pi * turns * motion[:, :, None, :])
+    kernel = kernel.reshape(len(d), len(d), -1)
+    return Series(
+        np.ascontiguousarray((vector / period[:, None]).T, dtype=np.float32),
+        scale.ravel().astype(np.float32),
+        mean.ravel().astype(np.float32),
+        np.stack([kernel.real, kernel.imag]).astype(np.float32),
+    )
+
+
+@njit(cache=True, nogil=True)
+def _words(fields: NDArray[np.int64], out: WordArray) -> None:
+    """`words_of` of one pixel."""
+    for pair in range(2):
+        x, y = fields[2 * pair], fields[2 * pair + 1]
+        out[pair * CLASSES] = np.uint32(x | y << 16)
+        for c in range(1, CLASSES):
+            own_x, own_y = fields[4 * c + 2 * pair] & OWN, fields[4 * c + 2 * pair + 1] & OWN
+            out[pair * CLASSES + c] = np.uint32((x ^ own_x) | (y ^ own_y) << 16)
+    out[ORDER] = np.uint32(fields[FIELDS - 1])
+
+
+@njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
+def _errors(
+    tables: WordArray,
+    words: WordArray,
+    count: int,
+    direction: Single,
+    scale: Single,
+    mean: Single,
+    turn: Single,
+    points: FloatArray,
+    out: Single,
+) -> None:
+    """Write E of one pixel to `out`, (2, terms): real and imaginary parts, up to the factor 1 / i."""
+    edges, terms = direction.shape[1], len(scale)
+    zero = np.uint32(0)
+    fill_pair(tables, words, count, False, zero, zero, points[0])
+    fill_pair(tables, words, count, True, zero, zero, points[1])
+    out[:] = np.float32(0.0)
+    for s in range(count):
+        x = np.float32((math.floor(points[0, s, 0] * COARSE) + 0.5) / COARSE - 0.5)
+        y = np.float32((math.floor(points[0, s, 1] * COARSE) + 0.5) / COARSE - 0.5)
+        u = np.float32((math.floor(points[1, s, 0] * COARSE) + 0.5) / COARSE - 0.5)
+        v = np.float32((math.floor(points[1, s, 1] * COARSE) + 0.5) / COARSE - 0.5)
+        for e in range(edges):
+            turns = direction[0, e] * x + direction[1, e] * y + direction[2, e] * u + direction[3, e] * v
+            phase = int(turns * np.float32(PHASES)) & (PHASES - 1)
+            step_r, step_i = turn[0, phase], turn[1, phase]
+            real, imaginary = step_r, step_i
+            for k in range(e, terms, edges):
+                out[0, k] += real
+                out[1, k] += imaginary
+                real, imaginary = real * step_r - imaginary * step_i, real * step_i + imaginary * step_r
+    share = np.float32(1.0 / count)
+    for k in range(terms):
+        out[0, k] = (out[0, k] * share - mean[k]) * scale[k]
+        out[1, k] *= share * scale[k]
+
+
+@njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
+def _spread(change: Single, pixel: int, kernel: Single, h: Single) -> None:
+    """Add K times a change of one pixel's E to `h`, (SIDE^2, 2, terms)."""
+    terms = change.shape[1]
+    row, column = pixel // SIDE, pixel % SIDE
+    for i in range(2 * REACH + 1):
+        for j in range(2 * REACH + 1):
+            at = (row + i - REACH) % SIDE * SIDE + (column + j - REACH) % SIDE
+            for k in range(terms):
+                h[at, 0, k] += kernel[0, i, j, k] * change[0, k] - kernel[1, i, j, k] * change[1, k]
+                h[at, 1, k] += kernel[0, i, j, k] * change[1, k] + kernel[1, i, j, k] * change[0, k]
+
+
+@njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
+def _sweep(
+    tables: WordArray,
+    fields: NDArray[np.int64],
+    free: NDArray[np.int64],
+    count: int,
+    direction: Single,
+    scale: Single,
+    mean: Single,
+    turn: Single,
+    kernel: Single,
+    keep: float,
+    heat: float,
+    key: int,
+    E: Single,
+    h: Single,
+) -> None:
+    """Propose one change for each pixel on average; `keep` is the multiple of |E|^2 that is subtracted."""
+    terms = len(scale)
+    new = np.empty((2, terms), np.float32)
+    points = np.empty((2, count, 2))
+    trial, words = np.empty(FIELDS, np.int64), np.empty(WORDS, np.uint32)
+    own, spared = kernel[0, REACH, REACH, 0], np.float32(keep)
+    two = np.float32(2.0)
+    for step in range(SIDE * SIDE):
+        pixel = int(unit(key, 4 * step) * SIDE * SIDE)
+        field = free[int(unit(key, 4 * step + 1) * len(free))]
+        trial[:] = fields[pixel]
+        trial[field] = int(unit(key, 4 * step + 2) * 65536.0)
+        _words(trial, words)
+        _errors(tables, words, count, direction, scale, mean, turn, points, new)
+        cost = np.float32(0.0)
+        for part in range(2):
+            for k in range(terms):
+                old = E[pixel, part, k]
+                d = new[part, k] - old
+                cost += d * (two * h[pixel, part, k] + own * d - spared * (new[part, k] + old))
+        if cost < 0.0 or unit(key, 4 * step + 3) < math.exp(-cost / heat):
+            fields[pixel, field] = trial[field]
+            for part in range(2):
+                for k in range(terms):
+                    value = new[part, k]
+                    new[part, k] = value - E[pixel, part, k]
+                    E[pixel, part, k] = value
+            _spread(new, pixel, kernel, h)
+
+
+@njit(cache=True, nogil=True)
+def _start(
+    tables: WordArray,
+    fields: NDArray[np.int64],
+    count: int,
+    direction: Single,
+    scale: Single,
+    mean: Single,
+    turn: Single,
+    kernel: Single,
+    E: Single,
+    h: Single,
+) -> None:
+    words, points = np.empty(WORDS, np.uint32), np.empty((2, count, 2))
+    for pixel in range(len(fields)):
+        _words(fields[pixel], words)
+        _errors(tables, words, count, direction, scale, mean, turn, points, E[pixel])
+        _spread(E[pixel], pixel, kernel, h)
+
+
+@njit(cache=True)
+def _random_fields(key: int, out: NDArray[np.int64]) -> None:
+    for k in range(out.size):
+        out.ravel()[k] = int(mix32(combine(key, k))) >> 16
+
+
+def make_tile(count: int, plan: Plan) -> Fields:
+    """Return the tile for `count` samples as (SIDE^2, FIELDS) fields, see `bluenoise.words_of`."""
+    tables, series, free = sobol_tables(), make_series(plan), np.array(plan.fields)
+    angle = 2.0 * math.pi * np.arange(PHASES) / PHASES
+    turn = np.stack([np.cos(angle), -np.sin(angle)]).astype(np.float32)
+    terms = (series.direction, series.scale, series.mean, turn)
+    fields = np.zeros((SIDE * SIDE, FIELDS), np.int64)
+    _random_fields(int(combine(0xB10E, count)), fields)
+    fields[:, np.setdiff1d(np.arange(FIELDS), free)] = 0
+    E = np.zeros((SIDE * SIDE, 2, len(series.scale)), np.float32)
+    h = np.zeros_like(E)
+    _start(tables, fields, count, *terms, series.kernel, E, h)
+    # The mean square that random keys have, from the tile of random keys.
+    wanted = float(np.square(E, dtype=np.float64).sum())
+    own = float(series.kernel[0, REACH, REACH, 0])
+    change = 2.0 * own * wanted / SIDE**2
+    keep = 0.5 * own
+    for k in range(plan.sweeps):
+        heat = HOT * (COLD / HOT) ** (k / (plan.sweeps - 1)) * change
+        key = int(combine(combine(0x5EED, count), k))
+        _sweep(tables, fields, free, count, *terms, series.kernel, keep, heat, key, E, h)
+        keep += 0.5 * own * (1.0 - float(np.square(E, dtype=np.float64).sum()) / wanted)
+    return words_checked(fields)
+
+
+def words_checked(fields: NDArray[np.int64]) -> Fields:
+    """Return the fields as they are stored, having checked that both ways to make words of them agree."""
+    stored = fields.astype(np.uint16)
+    stored[:, 4:-1] &= np.uint16(OWN)
+    one = np.empty(WORDS, np.uint32)
+    for row, expected in zip(fields, words_of(stored), strict=True):
+        _words(row, one)
+        if not np.array_equal(one, expected):
+            raise AssertionError(f"words {one} and {expected} of fields {row} differ")
+    return stored
+
+
+def main() -> None:
+    """Write the data file anew."""
+    with ThreadPoolExecutor() as pool:
+        tiles = pool.map(lambda count: make_tile(count, PLANS[count]), reversed(LEVELS))
+        np.savez_compressed(DATA, **{f"level_{n}": t for n, t in zip(reversed(LEVELS), tiles, strict=True)})
+
+
+if __name__ == "__main__":
+    main()
