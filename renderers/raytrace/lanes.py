@@ -21,7 +21,8 @@ RED, GREEN, BLUE = 176, 192, 208
 LX, LY, LZ, MX, MY, MZ = 224, 240, 256, 272, 288, 304  # the ray in a body's frame
 LOD, DISTANCE = 320, 336
 LENS_X, LENS_Y, SIGN = 352, 368, 384  # the point on the lens in world units; the sign of a sample's weight
-SCRATCH_SIZE = 400
+S_RIGHT, R_RIGHT, S_UP, R_UP = 400, 416, 432, 448  # how texture coordinates move along a sample's footprint
+SCRATCH_SIZE = 464
 
 # Rows of RTCRayHit16 (rtcore_ray.h), in lanes.
 RAY_OX, RAY_OY, RAY_OZ, RAY_TNEAR, RAY_DX, RAY_DY, RAY_DZ, RAY_TIME = 0, 16, 32, 48, 64, 80, 96, 112

@@ -29,6 +29,7 @@ from aliasbench.renderers.raytrace.lanes import (
 from aliasbench.renderers.raytrace.paths import (
     DONE,
     LIT,
+    MOST_SEGMENTS,
     Paths,
     Scattering,
     aim_at_lights,
@@ -46,7 +47,6 @@ from aliasbench.scenes.model import FloatArray
 
 _occluded16 = types.ExternalFunction("rtcOccluded16", types.void(types.intp, types.intp, types.intp, types.intp))
 
-MOST_SEGMENTS = 24
 _COHERENT = 1 << 16
 
 

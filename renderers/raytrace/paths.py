@@ -3,7 +3,7 @@
 What a path meets first decides. Unlit surfaces, lights and the background end it. A diffuse surface is lit by shadow
 rays to points on the lights; where the scene asks for a bounce, it also sends the path on in a direction drawn by the
 cosine, and what that meets is seen as from the camera, lit by one shadow ray where it is diffuse. Glossy surfaces and
-glass send the path on (`scattering`), as long as they go on. A light that a path meets counts, unless it comes from a
+glass send the path on (`scattering`), until MOST_SEGMENTS. A light that a path meets counts, unless it comes from a
 diffuse surface, which has been lit by it already. Glass and gloss throw shadows like anything else.
 
 Each step works on all lanes, between two intersections, and both engines take the same steps. New rays start a little
@@ -60,6 +60,7 @@ from aliasbench.renderers.sampling.hashing import combine, unit
 from aliasbench.renderers.sampling.patterns import DIM_DIRECTION, DIM_LIGHT, DIM_WAVELENGTH, Pattern
 from aliasbench.scenes.model import FloatArray
 
+MOST_SEGMENTS = 24  # of a path
 UNLIT, LIGHT, DIFFUSE, GLOSSY, GLASS = 0.0, 1.0, 2.0, 3.0, 4.0
 
 # Values of a light: corner, two edges, unit normal of its bright side, radiance, area, and the chance to be drawn with

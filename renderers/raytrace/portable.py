@@ -6,7 +6,7 @@ makes this the check on that too. embreex tells the nearest hit and nothing behi
 same ray is traced against each half of the triangles that may have holes, and so on, down to what it meets first.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,29 +18,36 @@ from numpy.typing import NDArray
 
 from aliasbench.renderers.raytrace.bodies import fill_body_rays, to_body
 from aliasbench.renderers.raytrace.cutouts import find_holes
+from aliasbench.renderers.raytrace.film import Film
 from aliasbench.renderers.raytrace.lanes import (
     LANES,
     RAY_DX,
     RAY_OX,
     RAY_SIZE,
+    RAY_TFAR,
     SCRATCH_SIZE,
+    fill_moving_rays,
+    fill_rays,
+)
+from aliasbench.renderers.raytrace.paths import MOST_SEGMENTS, Scattering
+from aliasbench.renderers.raytrace.pixel_sums import add_samples
+from aliasbench.renderers.raytrace.portable_film import Batch, FilmRoom
+from aliasbench.renderers.raytrace.positions import (
+    KEY_ROWS,
     KeyArray,
-    Sampling,
-    add_samples,
     fill_columns,
     fill_keys,
-    fill_moving_rays,
     fill_positions,
-    fill_rays,
     fill_times,
+    orders_size,
 )
 from aliasbench.renderers.raytrace.shading import MISS, Tables, shade_flat, shade_textured
 from aliasbench.renderers.raytrace.tables import Mesh
+from aliasbench.renderers.sampling.patterns import Pattern
 from aliasbench.scenes.model import FloatArray
 
 RayArray = NDArray[np.float32]
-# Packets held at once: some 10 MB.
-_BATCH = 4096
+_BATCH = 4096  # packets held at once: some 20 MB
 
 
 class _Triangles:
@@ -87,7 +94,7 @@ class _Body:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Search:
-    """The nearest hits so far: distances and triangles (n,) of all lanes of `scratch`."""
+    """The nearest hits so far: distances and triangles (n,) of all lanes of `scratch`; none beyond the first distances."""
 
     tables: Tables
     camera: FloatArray
@@ -148,33 +155,89 @@ class PortableEngine:
         """Take the meshes of the moving bodies, in their own frames."""
         self._bodies = [self._build(mesh) for mesh in meshes]
 
-    def fill(self, camera: FloatArray, pattern: Sampling, tables: Tables, moving: bool, out: RayArray) -> None:
-        """Write the picture (h, w, 3)."""
-        if self._is_closed:
-            raise RuntimeError("this renderer has been closed")
-        per_row = -(-out.shape[1] * pattern.samples // LANES)
+    def fill(
+        self,
+        camera: FloatArray,
+        pattern: Pattern,
+        tables: Tables,
+        moving: bool,
+        out: RayArray,
+        progress: Callable[[float], None] | None = None,
+    ) -> None:
+        """Write the picture (h, w, 3), every sample counting in its own pixel alone."""
+        self._check_open()
+        per_row = -(-out.shape[1] * pattern.count // LANES)
         rows = max(1, _BATCH // per_row)
         scratch = np.zeros((rows * per_row, SCRATCH_SIZE))
         rays = np.zeros((rows * per_row, RAY_SIZE), np.float32)
-        keys, sums = np.zeros((4, out.shape[1]), np.uint64), np.zeros(3)
-        fill_columns(pattern, keys)
+        keys, sums = np.zeros((KEY_ROWS, out.shape[1]), np.uint64), np.zeros(3)
+        orders, numbers = np.zeros((3, orders_size(pattern)), np.int32), np.zeros(LANES, np.int64)
+        fill_columns(pattern, 0, keys)
         for top in range(0, out.shape[0], rows):
             blocks = min(rows, out.shape[0] - top) * per_row
-            _make_rays(camera, pattern, moving, top, keys, scratch[:blocks], rays[:blocks])
-            hits = self._trace(tables, camera, scratch[:blocks], rays[:blocks])
+            _make_rays(camera, pattern, moving, top, keys, orders, numbers, scratch[:blocks], rays[:blocks])
+            nearest = np.full(blocks * LANES, np.inf, np.float32)
+            hits = self._trace(tables, camera, scratch[:blocks], rays[:blocks], nearest)
             _shade(camera, pattern, tables, top, hits, scratch[:blocks], sums, out)
+            if progress is not None:
+                progress(min(top + rows, len(out)) / len(out))
 
-    def _trace(self, tables: Tables, camera: FloatArray, scratch: FloatArray, rays: RayArray) -> NDArray[np.int32]:
-        """Return the triangles hit, (blocks, LANES)."""
-        nearest = np.full(rays.shape[0] * LANES, np.inf, np.float32)
+    def expose(
+        self,
+        camera: FloatArray,
+        pattern: Pattern,
+        tables: Tables,
+        moving: bool,
+        scattering: Scattering | None,
+        film: Film,
+    ) -> None:
+        """Add samples to a film; `scattering` where paths of light are needed."""
+        self._check_open()
+        room = FilmRoom(camera, pattern, tables, moving, film, _BATCH)
+        while (batch := room.next_batch()) is not None:
+            batch.hits[:] = self._trace(tables, camera, batch.scratch, batch.rays, batch.ends())
+            if scattering is None:
+                batch.shade()
+            else:
+                self._follow(batch, tables, camera, scattering)
+            batch.add()
+
+    def _follow(self, batch: Batch, tables: Tables, camera: FloatArray, scattering: Scattering) -> None:
+        """Follow the paths of a batch to their ends (see `path_kernels.film_paths`)."""
+        batch.start_paths()
+        for segment in range(MOST_SEGMENTS):
+            any_lit, any_flies = batch.scatter(segment)
+            if any_lit:
+                for k in range(scattering.shadow_rays if len(tables.lights) else 0):
+                    batch.aim_at_lights(segment, k, scattering.shadow_rays)
+                    ends = batch.shadow_rays[:, RAY_TFAR : RAY_TFAR + LANES].ravel().copy()
+                    hits = self._trace(tables, camera, batch.shadow, batch.shadow_rays, ends)
+                    batch.take_light(hits != MISS)
+                any_flies |= batch.leave_lit(scattering.bounces > 0, segment)
+            if not any_flies:
+                break
+            hits = self._trace(tables, camera, batch.scratch, batch.rays, batch.ends())
+            is_flying = batch.is_flying()
+            batch.hits[is_flying] = hits[is_flying]
+        batch.show_paths()
+
+    def _trace(
+        self, tables: Tables, camera: FloatArray, scratch: FloatArray, rays: RayArray, nearest: RayArray
+    ) -> NDArray[np.int32]:
+        """Return the triangles hit before the distances `nearest` (n,), (blocks, LANES)."""
         hits = np.full(nearest.shape, MISS, np.int32)
         search = _Search(tables, camera, scratch, nearest, hits)
         if self._still is not None:
             search.look(self._still, rays, 0)
         for index, body in enumerate(self._bodies):
-            _make_body_rays(tables.bodies[index], scratch, rays)
-            search.look(body, rays, int(tables.firsts[index]))
+            own = rays.copy()
+            _make_body_rays(tables.bodies[index], scratch, own)
+            search.look(body, own, int(tables.firsts[index]))
         return hits.reshape(-1, LANES)
+
+    def _check_open(self) -> None:
+        if self._is_closed:
+            raise RuntimeError("this renderer has been closed")
 
     def close(self) -> None:
         """Free everything (again is harmless)."""
@@ -190,18 +253,19 @@ def _vectors(rays: RayArray, at: int) -> RayArray:
 
 @njit(cache=True, error_model="numpy", _nrt=False)
 def _make_rays(
-    camera: FloatArray, pattern: Sampling, moving: bool, top: int, keys: KeyArray, scratch: FloatArray, rays: RayArray
-) -> None:
-    samples = keys.shape[1] * pattern.samples
+    camera: FloatArray, pattern: Pattern, moving: bool, top: int, keys: KeyArray, orders: NDArray[np.int32],
+    numbers: NDArray[np.int64], scratch: FloatArray, rays: RayArray,
+) -> None:  # fmt: skip
+    samples = keys.shape[1] * pattern.count
     per_row = (samples + LANES - 1) // LANES
     for block in range(len(scratch)):
         row, first = top + block // per_row, block % per_row * LANES
         if first == 0:
-            fill_keys(pattern, row, keys)
+            fill_keys(pattern, 0, row, keys)
         lanes = min(LANES, samples - first)
-        fill_positions(pattern, keys, row, first, lanes, scratch[block])
+        fill_positions(pattern, keys, row, first, lanes, orders, scratch[block])
         if moving:
-            fill_times(pattern, keys, first, lanes, scratch[block])
+            fill_times(pattern, keys, row, first, lanes, numbers, scratch[block])
             fill_moving_rays(camera, scratch[block], rays[block])
         else:
             fill_rays(camera, scratch[block], rays[block])
@@ -216,11 +280,11 @@ def _make_body_rays(values: FloatArray, scratch: FloatArray, rays: RayArray) -> 
 
 @njit(cache=True, error_model="numpy", _nrt=False)
 def _shade(
-    camera: FloatArray, pattern: Sampling, tables: Tables, top: int, hits: NDArray[np.int32], scratch: FloatArray,
+    camera: FloatArray, pattern: Pattern, tables: Tables, top: int, hits: NDArray[np.int32], scratch: FloatArray,
     sums: FloatArray, out: RayArray,
 ) -> None:  # fmt: skip
     textured = len(tables.triangles) > 0
-    samples = out.shape[1] * pattern.samples
+    samples = out.shape[1] * pattern.count
     per_row = (samples + LANES - 1) // LANES
     for block in range(len(scratch)):
         if textured:
@@ -228,4 +292,4 @@ def _shade(
         else:
             shade_flat(tables, hits[block], scratch[block])
         row, first = top + block // per_row, block % per_row * LANES
-        add_samples(pattern.samples, row, first, min(LANES, samples - first), scratch[block], sums, out)
+        add_samples(pattern.count, row, first, min(LANES, samples - first), scratch[block], sums, out)

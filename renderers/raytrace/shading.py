@@ -14,6 +14,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from aliasbench.renderers.raytrace.bodies import lane_to_body
+from aliasbench.renderers.raytrace.ewa import footprint_axes
 from aliasbench.renderers.raytrace.lanes import (
     BLUE,
     DISTANCE,
@@ -33,8 +34,12 @@ from aliasbench.renderers.raytrace.lanes import (
     OY,
     OZ,
     PERSPECTIVE,
+    R_RIGHT,
+    R_UP,
     RED,
     RIGHT,
+    S_RIGHT,
+    S_UP,
     SCALE,
     UP,
     U,
@@ -42,6 +47,7 @@ from aliasbench.renderers.raytrace.lanes import (
 )
 from aliasbench.renderers.raytrace.texturing import (
     COLOR,
+    EWA,
     KIND,
     LEVEL,
     MIPMAP,
@@ -226,10 +232,18 @@ def place_packet(tables: Tables, camera: FloatArray, hit: int, scratch: FloatArr
         return
     step = tables.footprint / camera[SCALE]
     perspective = camera[PERSPECTIVE]
-    level = int(values[LEVEL])
-    width, height = float(tables.levels[level, 1]), float(tables.levels[level, 2])
     rx, ry, rz = camera[RIGHT], camera[RIGHT + 1], camera[RIGHT + 2]
     ux, uy, uz = camera[UP], camera[UP + 1], camera[UP + 2]
+    if values[KIND] == EWA:
+        for i in range(LANES):
+            weight = step * (1.0 + perspective * (scratch[DISTANCE + i] - 1.0))
+            dx, dy, dz = scratch[DX + i], scratch[DY + i], scratch[DZ + i]
+            scratch[S_RIGHT + i], scratch[R_RIGHT + i], scratch[S_UP + i], scratch[R_UP + i] = footprint_axes(
+                row, values, weight, rx, ry, rz, ux, uy, uz, dx, dy, dz
+            )
+        return
+    level = int(values[LEVEL])
+    width, height = float(tables.levels[level, 1]), float(tables.levels[level, 2])
     for i in range(LANES):
         dx, dy, dz = scratch[DX + i], scratch[DY + i], scratch[DZ + i]
         weight = step * (1.0 + perspective * (scratch[DISTANCE + i] - 1.0))
@@ -259,15 +273,21 @@ def place_lane(tables: Tables, camera: FloatArray, hit: int, scratch: FloatArray
     if values[KIND] < MIPMAP:
         return
     weight = tables.footprint / camera[SCALE] * (1.0 + camera[PERSPECTIVE] * (t - 1.0))
+    rx, ry, rz = camera[RIGHT], camera[RIGHT + 1], camera[RIGHT + 2]
+    ux, uy, uz = camera[UP], camera[UP + 1], camera[UP + 2]
+    if in_body:
+        rx, ry, rz = _direction_to_body(tables.bodies[body], scratch, i, rx, ry, rz)
+        ux, uy, uz = _direction_to_body(tables.bodies[body], scratch, i, ux, uy, uz)
+    if values[KIND] == EWA:
+        scratch[S_RIGHT + i], scratch[R_RIGHT + i], scratch[S_UP + i], scratch[R_UP + i] = footprint_axes(
+            row, values, weight, rx, ry, rz, ux, uy, uz, dx, dy, dz
+        )
+        return
     level = int(values[LEVEL])
     width, height = float(tables.levels[level, 1]), float(tables.levels[level, 2])
-    longest = 1e-300
-    for axis in (RIGHT, UP):
-        qx, qy, qz = camera[axis], camera[axis + 1], camera[axis + 2]
-        if in_body:
-            qx, qy, qz = _direction_to_body(tables.bodies[body], scratch, i, qx, qy, qz)
-        longest = max(longest, _stretch(row, values, width, height, weight, qx, qy, qz, dx, dy, dz))
-    scratch[LOD + i] = 0.5 * np.log2(longest)
+    across = _stretch(row, values, width, height, weight, rx, ry, rz, dx, dy, dz)
+    down = _stretch(row, values, width, height, weight, ux, uy, uz, dx, dy, dz)
+    scratch[LOD + i] = 0.5 * np.log2(max(across, down, 1e-300))
 
 
 @njit(cache=True, error_model="numpy", _nrt=False)

@@ -41,6 +41,7 @@ from aliasbench.renderers.raytrace.texturing import (
     CHECKER,
     COLOR,
     CUTOFF,
+    EWA,
     KIND,
     LEVEL,
     LEVELS,
@@ -62,7 +63,7 @@ from aliasbench.renderers.raytrace.texturing import (
 from aliasbench.scenes.model import Checker, FloatArray, Grating, ImageTexture, Scene, Texture
 from aliasbench.scenes.textures import MipChain, scene_chain
 
-_CHAIN_KIND = {"point": NEAREST, "linear": TRILINEAR, "mipmap": MIPMAP, "trilinear": TRILINEAR}
+_CHAIN_KIND = {"point": NEAREST, "linear": TRILINEAR, "mipmap": MIPMAP, "trilinear": TRILINEAR, "ewa": EWA}
 
 
 @dataclass(frozen=True, slots=True, eq=False)

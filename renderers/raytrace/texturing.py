@@ -7,7 +7,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from aliasbench.renderers.raytrace.lanes import BLUE, GREEN, LANES, LOD, RED, U, V
+from aliasbench.renderers.raytrace.ewa import ewa_color
+from aliasbench.renderers.raytrace.lanes import BLUE, GREEN, LANES, LOD, R_RIGHT, R_UP, RED, S_RIGHT, S_UP, U, V
 from aliasbench.renderers.raytrace.trig import cos_turns
 from aliasbench.scenes.model import FloatArray
 
@@ -16,7 +17,7 @@ from aliasbench.scenes.model import FloatArray
 COLOR, KIND, PLACE, LOW, SPAN, PHASE, RATE, LEVEL, LEVELS, UV_MATRIX, CUTOFF = 0, 3, 4, 6, 9, 12, 13, 14, 15, 16, 22
 MATERIAL, ROUGHNESS, CAUCHY_A, CAUCHY_B, OBJECT_SIZE = 23, 24, 25, 26, 27
 PLAIN, CHECKER, SINE, SQUARE, ZONE = 0.0, 1.0, 2.0, 3.0, 4.0
-NEAREST, MIPMAP, TRILINEAR = 5.0, 6.0, 7.0
+NEAREST, MIPMAP, TRILINEAR, EWA = 5.0, 6.0, 7.0, 8.0
 
 IndexArray = NDArray[np.int64]
 TexelArray = NDArray[np.float32]
@@ -145,6 +146,17 @@ def _level_of(values: FloatArray, scratch: FloatArray, i: int) -> tuple[int, flo
 
 
 @njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+def _ewa(
+    values: FloatArray, levels: IndexArray, texels: TexelArray, scratch: FloatArray, i: int, s: float, r: float
+) -> tuple[float, float, float, float]:
+    """Return the colour and alpha of an image averaged over a lane's footprint."""
+    return ewa_color(
+        levels, texels, int(values[LEVEL]), int(values[LEVELS]), s, r,
+        scratch[S_RIGHT + i], scratch[R_RIGHT + i], scratch[S_UP + i], scratch[R_UP + i],
+    )  # fmt: skip
+
+
+@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
 def _look_up(values: FloatArray, levels: IndexArray, texels: TexelArray, scratch: FloatArray, i: int) -> None:
     """Write the colour of an image (or baked chain) from one level or between two."""
     s, r = _own_place(values, scratch, i)
@@ -153,6 +165,12 @@ def _look_up(values: FloatArray, levels: IndexArray, texels: TexelArray, scratch
         texel = _nearest(level[0], level[1], level[2], s, r)
         for k in range(3):
             scratch[RED + k * LANES + i] = values[COLOR + k] * texels[texel, k]
+        return
+    if values[KIND] == EWA:
+        red, green, blue, _ = _ewa(values, levels, texels, scratch, i, s, r)
+        scratch[RED + i] = values[COLOR] * red
+        scratch[RED + LANES + i] = values[COLOR + 1] * green
+        scratch[RED + 2 * LANES + i] = values[COLOR + 2] * blue
         return
     at, part = _level_of(values, scratch, i)
     red, green, blue = _bilinear(levels, texels, at, s, r)
@@ -191,6 +209,8 @@ def alpha_lane(values: FloatArray, levels: IndexArray, texels: TexelArray, scrat
     if values[KIND] == NEAREST:
         level = levels[int(values[LEVEL])]
         return texels[_nearest(level[0], level[1], level[2], s, r), 3]
+    if values[KIND] == EWA:
+        return _ewa(values, levels, texels, scratch, i, s, r)[3]
     at, part = _level_of(values, scratch, i)
     alpha = _bilinear_alpha(levels, texels, at, s, r)
     if part > 0.0:

@@ -5,16 +5,18 @@ the keys of neighbours belong together: a tile of keys, one for each N in `LEVEL
 (`make_bluenoise`), so that errors of half spaces over (pixel, second pair) are high-pass over the picture. That is what
 edges of penumbrae, lenses and shutters are, also where the place in the pixel moves the edge: at 16 samples half of the
 error comes from there, so the second pair has to share the pixel's place in the tile. (Heitz & Belcour 2019 permute
-pixels' keys for the picture at hand; Heitz et al. 2019 choose keys for all pictures, from 2^16 instead of 2^170 a pixel.)
+pixels' keys for the picture at hand; Heitz et al. 2019 choose them for all pictures. Here a pixel has 2^170 choices,
+made in small steps: permuting 2^14 keys under the same energy left .66 of white noise where this leaves .50.)
 
 The tile is for edges that move across the second pair's square the way they move over the picture: u along the
 picture's columns and v along its rows, both in the edge's direction. A shadow's border goes the other way over the
 light than over the floor, so a light's u has to run to the left in the picture, and v upwards. Another orientation
 costs the gain from 8 samples on, nothing else.
 
-Each seed and frame has the tile in another place, and points below their first 8 bits scrambled anew in each pixel. What
-no offset can change is the mean over the tile; it is 1 / 64 of a pixel's standard error for any integrand, and far less
-for the half spaces, whose mean over the tile is zero together with their low frequencies.
+Each seed and frame has the tile in another place, and points below their first 8 bits scrambled anew in each pixel.
+What no offset can change is the mean over the tile: 1 / 64 of a pixel's standard error for any integrand, and less for
+the half spaces, whose mean over the tile vanishes with their low frequencies. A toroidal shift of the points would end
+that too, but strata would then wrap around the square's border, which adds to the error.
 """
 
 from functools import cache
@@ -33,14 +35,14 @@ LEVELS = (1, 2, 4, 8, 16, 32)
 SIDE = 64
 DATA = Path(__file__).with_name("bluenoise.npz")
 
-# Words of a tile's pixel: the keys of the pixel's pair for points of each number modulo 4, those of the second pair, and
-# the key of the second pair's order.
-CLASSES = 4
-PIXEL, SECOND, ORDER = 0, CLASSES, 2 * CLASSES
-WORDS = 2 * CLASSES + 1
-FIELDS = 4 * CLASSES + 1
-# Bits of a field in which classes may differ. Bits 0, 1 and 9 place the quarters of the unit interval (all 8 ways that
-# the scrambling has), which are one class each in both dimensions; bits 2 to 6 and 10 to 12 move points within one.
+# Words of a tile's pixel: the keys of the pixel's pair, those of the second pair, and of the second pair's order. A
+# dimension has a key for each quarter of the unit interval, by the point's unscrambled place: still nested scrambling.
+QUARTERS = 4
+PIXEL, SECOND, ORDER = 0, QUARTERS, 2 * QUARTERS
+WORDS = 2 * QUARTERS + 1
+FIELDS = 4 * QUARTERS + 1
+# Bits of a field in which quarters may differ. Bits 0, 1 and 9 say where the quarters go, in all 8 ways that scrambling
+# has, and are common to them; bits 2 to 6 and 10 to 12 move points within one.
 OWN = 0x1C7C
 
 # A scrambled number's first 8 bits depend on these bits of its key, and on no others.
@@ -64,17 +66,28 @@ def bluenoise_tile(count: int) -> WordArray:
     if level != count:
         return bluenoise_tile(level)
     with np.load(DATA) as data:
-        fields = data[f"level_{level}"]
-    return read_only(words_of(fields).reshape(SIDE, SIDE, WORDS))
+        planes = data[f"level_{level}"]
+    return read_only(words_of(from_planes(planes)).reshape(SIDE, SIDE, WORDS))
+
+
+def to_planes(fields: NDArray[np.uint16]) -> NDArray[np.uint8]:
+    """Return (FIELDS, 2, n) lower and upper bytes of (n, FIELDS) fields: alike ones together are compressed best."""
+    return np.stack([fields.T & 0xFF, fields.T >> 8], axis=1).astype(np.uint8)
+
+
+def from_planes(planes: NDArray[np.uint8]) -> NDArray[np.uint16]:
+    """Return the fields of `to_planes`."""
+    wide = planes.astype(np.uint16)
+    return np.ascontiguousarray((wide[:, 0] | wide[:, 1] << 8).T)
 
 
 def words_of(fields: NDArray[np.uint16]) -> WordArray:
     """Return (n, WORDS) words of (n, FIELDS) fields of 16 bits.
 
-    Four fields are the first class's keys x, y of both pairs, then follow the other classes' differences from them, then
-    the order.
+    Four fields are the first quarter's keys x, y of both pairs, then follow the other quarters' differences from them,
+    then the order.
     """
-    keys = fields[:, :-1].reshape(-1, CLASSES, 4).copy()
+    keys = fields[:, :-1].reshape(-1, QUARTERS, 4).copy()
     keys[:, 1:] = keys[:, :1] ^ keys[:, 1:] & np.uint16(OWN)
     wide = keys.astype(np.uint32)
     pixel, second = wide[:, :, 0] | wide[:, :, 1] << 16, wide[:, :, 2] | wide[:, :, 3] << 16
@@ -135,8 +148,8 @@ def fill_pair(
     for i in range(count):
         n = np.uint32(tile_order(i, count, words[ORDER]) if second else i)
         x, y = sobol_bits(tables, 0, n), sobol_bits(tables, 1, n)
-        key_x, _ = tile_keys(words[first + (int(x) & 3)], fine_x, fine_y)
-        _, key_y = tile_keys(words[first + (int(y) & 3)], fine_x, fine_y)
+        key_x, _ = tile_keys(words[first + int(x) % QUARTERS], fine_x, fine_y)
+        _, key_y = tile_keys(words[first + int(y) % QUARTERS], fine_x, fine_y)
         out[i, 0], out[i, 1] = scrambled_unit(x, key_x), scrambled_unit(y, key_y)
 
 
