@@ -79,7 +79,9 @@ ENTRIES = (
         {
             "light_size": Parameter(0.6, 0.05, 1.5, "float", "side of the lamp, world units"),
             "reflectance": Parameter(0.8, 0.0, 0.95, "float", "share of light that white walls give back"),
-            "bounces": Parameter(1, 0, 1, "int", "0 leaves direct light alone, 1 adds light from one surface to another"),
+            "bounces": Parameter(
+                1, 0, 1, "int", "0 leaves direct light alone, 1 adds light from one surface to another"
+            ),
         },
     ),
 )

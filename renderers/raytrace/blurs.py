@@ -8,6 +8,7 @@ from aliasbench.renderers.raytrace.film import RUN_LANE, RUN_LANES, RUN_PIXEL, F
 from aliasbench.renderers.raytrace.lanes import LANES, LENS_X, LENS_Y, PX, PY, TIME
 from aliasbench.renderers.raytrace.positions import KeyArray, fill_line, fill_plane
 from aliasbench.renderers.raytrace.scattering import disc_point
+from aliasbench.renderers.sampling.bits import hidden
 from aliasbench.renderers.sampling.patterns import DIM_LENS, DIM_TIME, Pattern
 from aliasbench.scenes.model import FloatArray
 
@@ -41,7 +42,7 @@ def fill_film_lens(
             pattern, size, key, column, row, DIM_LENS, index, 1, run[RUN_LANE], run[RUN_LANES], numbers, scratch,
             LENS_X, LENS_Y,
         )  # fmt: skip
-    for i in range(LANES):
+    for i in range(hidden(LANES)):
         x, y = disc_point(scratch[LENS_X + i], scratch[LENS_Y + i])
         scratch[LENS_X + i], scratch[LENS_Y + i] = radius * x, radius * y
 

@@ -14,12 +14,13 @@ which costs the pilot twice and memory for nothing but their number.
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from aliasbench.renderers.raytrace.film import Film, develop_rows, profile_places, profile_table
+from aliasbench.renderers.raytrace.film import Film, develop_rows
+from aliasbench.renderers.raytrace.profiles import profile_polynomials
 from aliasbench.renderers.sampling.filters import FilterSpec, filter_of
 from aliasbench.renderers.sampling.hashing import combine
 from aliasbench.renderers.sampling.patterns import RANDOM, SOBOL, Pattern, make_pattern
@@ -47,7 +48,7 @@ class Optics:
     spec: FilterSpec
     warp: Warp
     is_splat: bool
-    profile: NDArray[np.float32]
+    profile: FloatArray
 
     @property
     def margin(self) -> int:
@@ -71,12 +72,10 @@ def make_optics(technique: Technique) -> Optics:
     spec = filter_of(technique)
     is_box = technique.filter == "box" and technique.radius_px == 0.5
     is_splat = technique.weighting == "samples" and not is_box
-    profile = np.zeros(0, np.float32)
-    if is_splat:
-        places = profile_places(spec.radius)
-        values = spec.profile(places) if spec.kind.separable else spec.evaluate(places, 0.0)
-        profile = profile_table(values)
-    return Optics(spec, make_warp(technique), is_splat, profile)
+    optics = Optics(spec, make_warp(technique), is_splat, np.zeros((0, 0, 0)))
+    if is_splat and spec.kind.separable:
+        return replace(optics, profile=profile_polynomials(spec, optics.margin, 0.5 * optics.spread))
+    return optics
 
 
 def is_plain(technique: Technique) -> bool:

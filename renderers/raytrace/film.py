@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from aliasbench.renderers.raytrace.lanes import BLUE, GREEN, LANES, PX, PY, RED, SIGN
 from aliasbench.renderers.raytrace.positions import BATCH, PIXEL, KeyArray, fill_run
+from aliasbench.renderers.raytrace.profiles import add_taps, weigh_lanes
 from aliasbench.renderers.sampling.hashing import combine
 from aliasbench.renderers.sampling.patterns import (
     DIM_X,
@@ -38,7 +39,6 @@ IntArray = NDArray[np.int64]
 RUN_PIXEL, RUN_INDEX, RUN_LANE, RUN_LANES = 0, 1, 2, 3
 
 _SPECK = 1e-12  # added to the weights of a pixel's own samples, which may all lie in the corners that a cone leaves out
-_STEPS = 2048  # of the table of a profile: linear interpolation then errs by 1e-6 of the peak at most
 
 
 class Film(NamedTuple):
@@ -63,8 +63,8 @@ class Film(NamedTuple):
         Of the filter, and the side of the square that samples are spread over, in pixels.
     radial : bool
         The filter is a cone; else it is the product of a profile along x and y.
-    profile : (2050,) float32
-        The profile from 0 to the radius, then 0.
+    profile : (pieces, 2 margin + 1, terms) float64
+        See `profiles.profile_polynomials`.
     warp : Warp
         Of weighted distributions.
     """
@@ -82,21 +82,11 @@ class Film(NamedTuple):
     radius: float
     spread: float
     radial: bool
-    profile: NDArray[np.float32]
+    profile: FloatArray
     warp: Warp
 
 
-def profile_table(values: FloatArray) -> NDArray[np.float32]:
-    """Return `Film.profile` of a profile's values at `profile_places` of its radius."""
-    return np.append(values, 0.0).astype(np.float32)
-
-
-def profile_places(radius: float) -> FloatArray:
-    """Return the distances at which a profile is tabled; its kinks at shares of the radius are among them."""
-    return np.linspace(0.0, radius, _STEPS + 1)
-
-
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
 def next_runs(film: Film, r: int, cursor: IntArray, runs: IntArray) -> tuple[int, int]:
     """Return how many lanes and how many runs the next packet of a row has, 0 and 0 at its end; write `runs`.
 
@@ -138,7 +128,7 @@ def run_address(pattern: Pattern, film: Film, keys: KeyArray, r: int, run: IntAr
     return key, film.ends[r, k] - begin, index - begin
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
 def place_runs(
     pattern: Pattern, film: Film, keys: KeyArray, r: int, runs: IntArray, count: int, orders: NDArray[np.int32],
     scratch: FloatArray,
@@ -176,14 +166,15 @@ def place_runs(
             scratch[PY + i] += row + 0.5
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
 def add_runs(
-    film: Film, r: int, runs: IntArray, count: int, weights: FloatArray, taps: FloatArray, scratch: FloatArray
-) -> None:
+    film: Film, r: int, runs: IntArray, count: int, weights: FloatArray, taps: FloatArray, room: FloatArray,
+    scratch: FloatArray,
+) -> None:  # fmt: skip
     """Add a packet's colours to the film.
 
-    `weights` (2, 2 margin + 1, LANES) and `taps` (2 margin + 1, 2 margin + 1, 4) are room for splats; the latter keeps
-    a pixel from one packet to the next.
+    `weights` (2 margin + 1, 2 LANES), `taps` (2 margin + 1, 2 margin + 1, 4) and `room` (4, 2 LANES) are room for
+    splats; `taps` keeps a pixel from one packet to the next.
     """
     if film.warp.code != IDENTITY:
         for i in range(LANES):
@@ -196,20 +187,27 @@ def add_runs(
             _sum_run(film, r, runs[n], scratch)
         return
     if not film.radial:
-        _weigh_lanes(film, r, runs, count, weights, scratch)
+        _weigh_runs(film, r, runs, count, weights, room, scratch)
     for n in range(count):
         run = runs[n]
         k, index = run[RUN_PIXEL], run[RUN_INDEX]
         if index == film.begins[r, k]:
-            taps[:] = 0.0
+            _clear(taps)
         if film.radial:
             _tap_radial(film, r, run, taps, scratch)
         elif run[RUN_LANES] == LANES:
-            _tap_packet(film.margin, weights, taps, scratch)
+            add_taps(film.margin, weights, scratch, RED, taps, room)
         else:
             _tap_lanes(film.margin, run[RUN_LANE], run[RUN_LANES], weights, taps, scratch)
         if index + run[RUN_LANES] == film.ends[r, k]:
             _splat_pixel(film, r, k, taps)
+
+
+@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+def _clear(taps: FloatArray) -> None:
+    values = taps.reshape(taps.size)
+    for k in range(len(values)):
+        values[k] = 0.0
 
 
 @njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
@@ -242,59 +240,28 @@ def _sum_run(film: Film, r: int, run: IntArray, scratch: FloatArray) -> None:
         film.squares[r, k, c] += square
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
-def _weigh_lanes(
-    film: Film, r: int, runs: IntArray, count: int, weights: FloatArray, scratch: FloatArray
+@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+def _weigh_runs(
+    film: Film, r: int, runs: IntArray, count: int, weights: FloatArray, room: FloatArray, scratch: FloatArray
 ) -> None:
     """Write the profile at every lane's distance from each column, and from each row, that it reaches."""
-    scale = _STEPS / film.radius
+    y = film.row + r + 0.5
     for n in range(count):
         run = runs[n]
-        x, y = film.column + run[RUN_PIXEL] + 0.5, film.row + r + 0.5
+        x = film.column + run[RUN_PIXEL] + 0.5
         for i in range(run[RUN_LANE], run[RUN_LANE] + run[RUN_LANES]):
             scratch[PX + i] -= x
             scratch[PY + i] -= y
-    for axis in range(2):
-        at = PX + axis * LANES
-        for j in range(2 * film.margin + 1):
-            for i in range(LANES):
-                place = abs(scratch[at + i] - (j - film.margin)) * scale
-                # beyond the radius the table's last step falls to zero, and stays there
-                outside = place > _STEPS
-                place = min(place, float(_STEPS))
-                step = min(int(place), _STEPS - 1) & 0xFFF
-                low = float(film.profile[step])
-                value = low + (place - step) * (float(film.profile[step + 1]) - low)
-                weights[axis, j, i] = 0.0 if outside else value
+    weigh_lanes(film.profile, 0.5 * film.spread, film.radius, scratch, PX, weights, room)
 
 
-@njit(cache=True, error_model="numpy", fastmath={"reassoc"}, _nrt=False)
-def _tap_packet(margin: int, weights: FloatArray, taps: FloatArray, scratch: FloatArray) -> None:
-    """Add 16 samples of one pixel to its taps."""
-    for j in range(2 * margin + 1):
-        for k in range(2 * margin + 1):
-            red, green, blue, total = 0.0, 0.0, 0.0, 0.0
-            for i in range(LANES):
-                w = weights[1, j, i] * weights[0, k, i]
-                red += w * scratch[RED + i]
-                green += w * scratch[GREEN + i]
-                blue += w * scratch[BLUE + i]
-                total += w
-            taps[j, k, 0] += red
-            taps[j, k, 1] += green
-            taps[j, k, 2] += blue
-            taps[j, k, 3] += total
-
-
-@njit(cache=True, error_model="numpy", _nrt=False)
-def _tap_lanes(
-    margin: int, lane: int, length: int, weights: FloatArray, taps: FloatArray, scratch: FloatArray
-) -> None:
+@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+def _tap_lanes(margin: int, lane: int, length: int, weights: FloatArray, taps: FloatArray, scratch: FloatArray) -> None:
     for i in range(lane, lane + length):
         red, green, blue = scratch[RED + i], scratch[GREEN + i], scratch[BLUE + i]
         for j in range(2 * margin + 1):
             for k in range(2 * margin + 1):
-                w = weights[1, j, i] * weights[0, k, i]
+                w = weights[j, LANES + i] * weights[k, i]
                 taps[j, k, 0] += w * red
                 taps[j, k, 1] += w * green
                 taps[j, k, 2] += w * blue
@@ -305,7 +272,7 @@ def _tap_lanes(
 def _tap_radial(film: Film, r: int, run: IntArray, taps: FloatArray, scratch: FloatArray) -> None:
     """Add a run's samples to their pixel's taps under the cone."""
     x, y = film.column + run[RUN_PIXEL] + 0.5, film.row + r + 0.5
-    slope, peak = 1.0 / film.radius, float(film.profile[0])
+    slope, peak = 1.0 / film.radius, 3.0 / (np.pi * film.radius * film.radius)
     for i in range(run[RUN_LANE], run[RUN_LANE] + run[RUN_LANES]):
         dx, dy = scratch[PX + i] - x, scratch[PY + i] - y
         red, green, blue = scratch[RED + i], scratch[GREEN + i], scratch[BLUE + i]
@@ -322,7 +289,7 @@ def _tap_radial(film: Film, r: int, run: IntArray, taps: FloatArray, scratch: Fl
                 taps[j, k, 3] += w
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
 def _splat_pixel(film: Film, r: int, k: int, taps: FloatArray) -> None:
     """Add a pixel's taps to the row's buffers; what falls outside of the image is dropped."""
     scale, width = film.scales[r, k], film.splats.shape[2]

@@ -26,12 +26,23 @@ from aliasbench.renderers.raytrace.lanes import (
     LANES,
     LENS_RADIUS,
     RAY_TFAR,
+    camera_moves,
     fill_moving_rays,
     fill_rays,
 )
 from aliasbench.renderers.raytrace.pixel_sums import add_samples
 from aliasbench.renderers.raytrace.positions import KeyArray, fill_columns, fill_keys, fill_positions, fill_times
 from aliasbench.renderers.raytrace.shading import MISS, Tables, shade_flat, shade_textured
+from aliasbench.renderers.raytrace.ray_order import (
+    PACKETS,
+    SAMPLES,
+    Block,
+    keep_colors,
+    put_packet,
+    restore_packet,
+    sort_block,
+    take_sorted,
+)
 from aliasbench.renderers.sampling.patterns import Pattern
 from aliasbench.scenes.model import FloatArray
 
@@ -46,6 +57,7 @@ llvmlite.binding.load_library_permanently(str(library_path()))
 intersect16 = types.ExternalFunction("rtcIntersect16", types.void(types.intp, types.intp, types.intp, types.intp))
 
 NOTHING = -1  # Embree's invalid id, as int32
+EMPTY = 0  # handed over instead of a scene without triangles
 
 
 @intrinsic
@@ -62,7 +74,7 @@ def take_next(typing_context: Any, counter: Any) -> Any:  # noqa: ARG001 - numba
 class Workspace(NamedTuple):
     """One thread's memory, aligned as Embree needs it; `holes` only keeps alive what `arguments` point to.
 
-    `orders`, `numbers`, `runs`, `cursor`, `weights` and `taps` are what `positions` and `film` ask for.
+    `orders`, `numbers`, `runs`, `parts` (runs of each packet), `cursor`, `weights`, `taps` and `room` are what `positions` and `film` ask for.
     """
 
     scratch: FloatArray
@@ -78,9 +90,12 @@ class Workspace(NamedTuple):
     orders: IntArray
     numbers: CountArray
     runs: CountArray
+    parts: CountArray
     cursor: CountArray
     weights: FloatArray
     taps: FloatArray
+    room: FloatArray
+    block: Block
     holes: CountArray
 
 
@@ -94,7 +109,8 @@ def trace(scene: int, work: Workspace, lanes: int) -> None:
         work.ray_ids[HIT_PRIM + i] = MISS
     for i in range(LANES):
         work.valid[i] = -1 if i < lanes else 0
-    intersect16(work.valid.ctypes.data, scene, work.ray.ctypes.data, work.arguments.ctypes.data)
+    if scene != EMPTY:
+        intersect16(work.valid.ctypes.data, scene, work.ray.ctypes.data, work.arguments.ctypes.data)
     for i in range(LANES):
         work.hits[i] = work.ray_ids[HIT_PRIM + i]
 
@@ -118,6 +134,26 @@ def trace_bodies(
             if work.body_ids[HIT_GEOM + i] != NOTHING:
                 work.hits[i] = first + work.body_ids[HIT_PRIM + i]
                 work.ray[RAY_TFAR + i] = work.body_ray[RAY_TFAR + i]
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def _trace_block(
+    scene: int, scenes: CountArray, camera: FloatArray, tables: Tables, work: Workspace, count: int, textured: bool
+) -> None:
+    """Find the colours of a block of `count` samples, in packets of nearly one time or place on the lens."""
+    # the lens matters less than bodies that move meanwhile
+    sort_block(work.block, count, camera[LENS_RADIUS] if len(scenes) == 0 else 0.0)
+    for p in range((count + LANES - 1) // LANES):
+        lanes = min(LANES, count - p * LANES)
+        take_sorted(work.block, p, lanes, work.scratch)
+        fill_moving_rays(camera, work.scratch, work.ray)
+        trace(scene, work, lanes)
+        trace_bodies(scenes, tables, work, *picture_reach(work.scratch, lanes))
+        if textured:
+            shade_textured(tables, camera, work.hits, work.scratch)
+        else:
+            shade_flat(tables, work.hits, work.scratch)
+        keep_colors(work.block, p, lanes, work.scratch)
 
 
 @njit(nogil=True, cache=True, error_model="numpy", _nrt=False)
@@ -178,19 +214,20 @@ def render_moving(
             return
         fill_keys(pattern, 0, row, work.keys)
         samples = out.shape[1] * pattern.count
-        for first in range(0, samples, LANES):
-            lanes = min(LANES, samples - first)
-            fill_positions(pattern, work.keys, row, first, lanes, work.orders, work.scratch)
-            fill_times(pattern, work.keys, row, first, lanes, work.numbers, work.scratch)
-            fill_moving_rays(camera, work.scratch, work.ray)
-            trace(scene, work, lanes)
-            left, right = first // pattern.count, (first + lanes - 1) // pattern.count + 1
-            trace_bodies(scenes, tables, work, float(left), float(right), float(row), row + 1.0)
-            if textured:
-                shade_textured(tables, camera, work.hits, work.scratch)
-            else:
-                shade_flat(tables, work.hits, work.scratch)
-            add_samples(pattern.count, row, first, lanes, work.scratch, work.sums, out)
+        for start in range(0, samples, SAMPLES):
+            count = min(SAMPLES, samples - start)
+            packets = (count + LANES - 1) // LANES
+            for p in range(packets):
+                lanes = min(LANES, count - p * LANES)
+                first = start + p * LANES
+                fill_positions(pattern, work.keys, row, first, lanes, work.orders, work.scratch)
+                fill_times(pattern, work.keys, row, first, lanes, work.numbers, work.scratch)
+                put_packet(work.block, p, work.scratch)
+            _trace_block(scene, scenes, camera, tables, work, count, textured)
+            for p in range(packets):
+                restore_packet(work.block, p, work.scratch)
+                lanes = min(LANES, count - p * LANES)
+                add_samples(pattern.count, row, start + p * LANES, lanes, work.scratch, work.sums, out)
 
 
 @njit(nogil=True, cache=True, error_model="numpy", _nrt=False)
@@ -207,17 +244,17 @@ def film_static(
         fill_keys(pattern, film.column, film.row + r, work.keys)
         work.cursor[:] = 0
         while True:
-            lanes, runs = next_runs(film, r, work.cursor, work.runs)
+            lanes, runs = next_runs(film, r, work.cursor, work.runs[0])
             if lanes == 0:
                 break
-            place_runs(pattern, film, work.keys, r, work.runs, runs, work.orders, work.scratch)
+            place_runs(pattern, film, work.keys, r, work.runs[0], runs, work.orders, work.scratch)
             fill_rays(camera, work.scratch, work.ray)
             trace(scene, work, lanes)
             if textured:
                 shade_textured(tables, camera, work.hits, work.scratch)
             else:
                 shade_flat(tables, work.hits, work.scratch)
-            add_runs(film, r, work.runs, runs, work.weights, work.taps, work.scratch)
+            add_runs(film, r, work.runs[0], runs, work.weights, work.taps, work.room, work.scratch)
 
 
 @njit(nogil=True, cache=True, error_model="numpy", _nrt=False)
@@ -227,6 +264,7 @@ def film_moving(
 ) -> None:  # fmt: skip
     """Expose the film's rows until there are none left: samples have times of their own, and points on the lens."""
     textured = len(tables.triangles) > 0
+    timed = len(scenes) > 0 or camera_moves(camera)
     fill_columns(pattern, film.column, work.keys)
     while True:
         r = take_next(counter)
@@ -235,20 +273,25 @@ def film_moving(
         row = film.row + r
         fill_keys(pattern, film.column, row, work.keys)
         work.cursor[:] = 0
-        while True:
-            lanes, runs = next_runs(film, r, work.cursor, work.runs)
-            if lanes == 0:
-                break
-            place_runs(pattern, film, work.keys, r, work.runs, runs, work.orders, work.scratch)
-            fill_film_times(pattern, film, work.keys, r, work.runs, runs, work.numbers, work.scratch)
-            if camera[LENS_RADIUS] > 0.0:
-                radius = camera[LENS_RADIUS]
-                fill_film_lens(pattern, film, work.keys, r, work.runs, runs, work.numbers, radius, work.scratch)
-            fill_moving_rays(camera, work.scratch, work.ray)
-            trace(scene, work, lanes)
-            trace_bodies(scenes, tables, work, *picture_reach(work.scratch, lanes))
-            if textured:
-                shade_textured(tables, camera, work.hits, work.scratch)
-            else:
-                shade_flat(tables, work.hits, work.scratch)
-            add_runs(film, r, work.runs, runs, work.weights, work.taps, work.scratch)
+        lanes = LANES
+        while lanes > 0:
+            count, packets = 0, 0
+            while packets < PACKETS:
+                runs = work.runs[packets]
+                lanes, parts = next_runs(film, r, work.cursor, runs)
+                if lanes == 0:
+                    break
+                work.parts[packets] = parts
+                place_runs(pattern, film, work.keys, r, runs, parts, work.orders, work.scratch)
+                if timed:
+                    fill_film_times(pattern, film, work.keys, r, runs, parts, work.numbers, work.scratch)
+                if camera[LENS_RADIUS] > 0.0:
+                    radius = camera[LENS_RADIUS]
+                    fill_film_lens(pattern, film, work.keys, r, runs, parts, work.numbers, radius, work.scratch)
+                put_packet(work.block, packets, work.scratch)
+                count += lanes
+                packets += 1
+            _trace_block(scene, scenes, camera, tables, work, count, textured)
+            for p in range(packets):
+                restore_packet(work.block, p, work.scratch)
+                add_runs(film, r, work.runs[p], work.parts[p], work.weights, work.taps, work.room, work.scratch)

@@ -70,6 +70,13 @@ def fill_rays(camera: FloatArray, scratch: FloatArray, ray: NDArray[np.float32])
 
 
 @njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+def camera_moves(camera: FloatArray) -> bool:
+    """Return whether the camera is anywhere else at another time of the exposure."""
+    travels = camera[EYE_TRAVEL] != 0.0 or camera[EYE_TRAVEL + 1] != 0.0 or camera[EYE_TRAVEL + 2] != 0.0
+    return travels or camera[TURNING] != 0.0
+
+
+@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
 def fill_moving_rays(camera: FloatArray, scratch: FloatArray, ray: NDArray[np.float32]) -> None:
     """Write the rays of all 16 lanes for a camera that moves, each from where the camera is at the lane's time.
 
@@ -82,6 +89,9 @@ def fill_moving_rays(camera: FloatArray, scratch: FloatArray, ray: NDArray[np.fl
     fx, fy, fz = camera[FORWARD], camera[FORWARD + 1], camera[FORWARD + 2]
     hx, hy, hz = camera[UP_HINT], camera[UP_HINT + 1], camera[UP_HINT + 2]
     turning, has_lens, is_given = camera[TURNING] != 0.0, camera[LENS_RADIUS] > 0.0, camera[FOCUS] > 0.0
+    if not (has_lens or camera_moves(camera)):
+        fill_rays(camera, scratch, ray)
+        return
     focus = camera[FOCUS]
     if has_lens and not is_given:
         focus = np.sqrt(camera[AXIS] ** 2 + camera[AXIS + 1] ** 2 + camera[AXIS + 2] ** 2)

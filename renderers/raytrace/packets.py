@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from aliasbench.renderers.raytrace.embree import Device, TriangleScene
 from aliasbench.renderers.raytrace.film import Film
 from aliasbench.renderers.raytrace.kernels import (
+    EMPTY,
     Workspace,
     film_moving,
     film_static,
@@ -30,6 +31,7 @@ from aliasbench.renderers.raytrace.positions import KEY_ROWS, orders_size
 from aliasbench.renderers.raytrace.shading import Tables
 from aliasbench.renderers.raytrace.tables import Mesh
 from aliasbench.renderers.raytrace.texturing import CUTOFF
+from aliasbench.renderers.raytrace.ray_order import PACKETS, make_block
 from aliasbench.renderers.sampling.patterns import Pattern
 from aliasbench.scenes.model import FloatArray
 
@@ -64,10 +66,13 @@ def make_workspace(width: int, pattern: Pattern, margin: int) -> Workspace:
         np.zeros((KEY_ROWS, width), np.uint64),
         np.zeros((3, orders_size(pattern)), np.int32),
         np.zeros(LANES, np.int64),
-        np.zeros((LANES, 4), np.int64),
+        np.zeros((PACKETS, LANES, 4), np.int64),
+        np.zeros(PACKETS, np.int64),
         np.zeros(2, np.int64),
-        np.zeros((2, taps, LANES)),
+        np.zeros((taps, 2 * LANES)),
         np.zeros((taps, taps, 4)),
+        np.zeros((4, 2 * LANES)),
+        make_block(),
         np.zeros(0, np.int64),
     )
 
@@ -75,12 +80,13 @@ def make_workspace(width: int, pattern: Pattern, margin: int) -> Workspace:
 class PacketEngine:
     """Holds the scene's meshes in Embree and renders pictures with the kernels; see `tracer.Engine`."""
 
-    __slots__ = ("_bodies", "_device", "_handles", "_pool", "_robust", "_still", "_threads")
+    __slots__ = ("_bodies", "_device", "_handles", "_has_still", "_pool", "_robust", "_still", "_threads")
 
     def __init__(self, threads: int, *, robust: bool) -> None:
         self._device = Device()
         self._robust = robust
         self._still: TriangleScene | None = None
+        self._has_still = False
         self._bodies: list[TriangleScene] = []
         self._handles = np.zeros(0, np.int64)
         self._threads = threads
@@ -97,6 +103,7 @@ class PacketEngine:
         if self._still is not None:
             self._still.close()
         self._still = self._build(mesh, 0)
+        self._has_still = bool(len(mesh.triangles))
 
     def set_moving(self, meshes: Sequence[Mesh]) -> None:
         """Take the meshes of the moving bodies, in their own frames."""
@@ -146,7 +153,7 @@ class PacketEngine:
     def _still_handle(self) -> int:
         if self._still is None:
             raise RuntimeError("this renderer has been closed")
-        return self._still.handle
+        return self._still.handle if self._has_still else EMPTY
 
     def _run(
         self,

@@ -8,6 +8,7 @@ from aliasbench.renderers.raytrace.blurs import fill_film_lens, fill_film_times,
 from aliasbench.renderers.raytrace.bodies import fill_body_rays, to_body
 from aliasbench.renderers.raytrace.film import Film, add_runs, next_runs, place_runs
 from aliasbench.renderers.raytrace.kernels import (
+    EMPTY,
     NOTHING,
     CountArray,
     Workspace,
@@ -59,7 +60,8 @@ def _trace_paths(scene: int, scenes: CountArray, tables: Tables, paths: Paths, w
         work.ray_ids[HIT_PRIM + i] = MISS
         work.valid[i] = -1 if DONE < paths.states[i] < LIT else 0
     work.arguments[0] = 0  # of paths that have been scattered, hardly two go the same way
-    intersect16(work.valid.ctypes.data, scene, work.ray.ctypes.data, work.arguments.ctypes.data)
+    if scene != EMPTY:
+        intersect16(work.valid.ctypes.data, scene, work.ray.ctypes.data, work.arguments.ctypes.data)
     for i in range(LANES):
         if work.valid[i] != 0:
             work.hits[i] = work.ray_ids[HIT_PRIM + i]
@@ -70,13 +72,12 @@ def _trace_paths(scene: int, scenes: CountArray, tables: Tables, paths: Paths, w
 @njit(cache=True, error_model="numpy", _nrt=False)
 def _trace_shadows(scene: int, scenes: CountArray, tables: Tables, shadow: Workspace) -> None:
     """Find which shadow rays are stopped by anything: their end is set to minus infinity."""
-    _occluded16(shadow.valid.ctypes.data, scene, shadow.ray.ctypes.data, shadow.arguments.ctypes.data)
+    if scene != EMPTY:
+        _occluded16(shadow.valid.ctypes.data, scene, shadow.ray.ctypes.data, shadow.arguments.ctypes.data)
     for body in range(len(scenes)):
         to_body(tables.bodies[body], shadow.scratch)
         fill_body_rays(shadow.scratch, shadow.ray, shadow.body_ray)
-        _occluded16(
-            shadow.valid.ctypes.data, scenes[body], shadow.body_ray.ctypes.data, shadow.arguments.ctypes.data
-        )
+        _occluded16(shadow.valid.ctypes.data, scenes[body], shadow.body_ray.ctypes.data, shadow.arguments.ctypes.data)
         for i in range(LANES):
             if shadow.body_ray[RAY_TFAR + i] < 0.0:
                 shadow.ray[RAY_TFAR + i] = -np.inf
@@ -101,21 +102,21 @@ def film_paths(
         fill_keys(pattern, film.column, film.row + r, work.keys)
         work.cursor[:] = 0
         while True:
-            lanes, runs = next_runs(film, r, work.cursor, work.runs)
+            lanes, runs = next_runs(film, r, work.cursor, work.runs[0])
             if lanes == 0:
                 break
-            place_runs(pattern, film, work.keys, r, work.runs, runs, work.orders, work.scratch)
+            place_runs(pattern, film, work.keys, r, work.runs[0], runs, work.orders, work.scratch)
             if moving:
-                fill_film_times(pattern, film, work.keys, r, work.runs, runs, work.numbers, work.scratch)
+                fill_film_times(pattern, film, work.keys, r, work.runs[0], runs, work.numbers, work.scratch)
                 if camera[LENS_RADIUS] > 0.0:
                     radius = camera[LENS_RADIUS]
-                    fill_film_lens(pattern, film, work.keys, r, work.runs, runs, work.numbers, radius, work.scratch)
+                    fill_film_lens(pattern, film, work.keys, r, work.runs[0], runs, work.numbers, radius, work.scratch)
                 fill_moving_rays(camera, work.scratch, work.ray)
             else:
                 fill_rays(camera, work.scratch, work.ray)
             trace(scene, work, lanes)
             trace_bodies(scenes, tables, work, *picture_reach(work.scratch, lanes))
-            start_paths(pattern, film, work.keys, r, work.runs, runs, lanes, work.numbers, paths)
+            start_paths(pattern, film, work.keys, r, work.runs[0], runs, lanes, work.numbers, paths)
             for segment in range(MOST_SEGMENTS):
                 shade_textured(tables, camera, work.hits, work.scratch)
                 any_lit, any_flies = scatter(tables, work.hits, segment, paths, work.scratch, work.ray)
@@ -123,7 +124,7 @@ def film_paths(
                     if has_lights:
                         for k in range(scattering.shadow_rays):
                             draw_lights(
-                                pattern, film, work.keys, r, work.runs, runs, scattering.shadow_rays, k, work.numbers,
+                                pattern, film, work.keys, r, work.runs[0], runs, scattering.shadow_rays, k, work.numbers,
                                 paths,
                             )  # fmt: skip
                             if aim_at_lights(
@@ -136,4 +137,4 @@ def film_paths(
                     break
                 _trace_paths(scene, scenes, tables, paths, work)
             show_paths(paths, work.scratch)
-            add_runs(film, r, work.runs, runs, work.weights, work.taps, work.scratch)
+            add_runs(film, r, work.runs[0], runs, work.weights, work.taps, work.room, work.scratch)

@@ -65,7 +65,17 @@ UNLIT, LIGHT, DIFFUSE, GLOSSY, GLASS = 0.0, 1.0, 2.0, 3.0, 4.0
 
 # Values of a light: corner, two edges, unit normal of its bright side, radiance, area, and the chance to be drawn with
 # the sum of those before.
-CORNER, EDGE_1, EDGE_2, LIGHT_NORMAL, RADIANCE, AREA, CHANCE, CHANCES_BEFORE, LIGHT_SIZE = 0, 3, 6, 9, 12, 15, 16, 17, 18
+CORNER, EDGE_1, EDGE_2, LIGHT_NORMAL, RADIANCE, AREA, CHANCE, CHANCES_BEFORE, LIGHT_SIZE = (
+    0,
+    3,
+    6,
+    9,
+    12,
+    15,
+    16,
+    17,
+    18,
+)
 
 # What a path is about to do: nothing any more; fly on, from the camera or a mirror, from a diffuse surface, or from a
 # mirror after one; be lit, and then bounce; be lit, and then end.
@@ -101,9 +111,7 @@ class Paths(NamedTuple):
 
 def make_paths() -> Paths:
     """Return room for the paths of a packet."""
-    return Paths(
-        np.zeros(PATH_SIZE), np.zeros(LANES, np.int32), np.zeros(LANES, np.uint64), np.zeros(LANES, np.int64)
-    )
+    return Paths(np.zeros(PATH_SIZE), np.zeros(LANES, np.int32), np.zeros(LANES, np.uint64), np.zeros(LANES, np.int64))
 
 
 @njit(cache=True, error_model="numpy", _nrt=False)
@@ -224,9 +232,7 @@ def _see(rows: FloatArray, scratch: FloatArray, i: int) -> None:
 
 
 @njit(cache=True, error_model="numpy", _nrt=False)
-def _arrive(
-    tables: Tables, hit: int, rows: FloatArray, scratch: FloatArray, i: int
-) -> tuple[float, float, float]:
+def _arrive(tables: Tables, hit: int, rows: FloatArray, scratch: FloatArray, i: int) -> tuple[float, float, float]:
     """Write the place of a hit; return the unit normal there, towards the side that the triangle winds about."""
     t, nx, ny, nz = meet_plane(tables, hit, scratch, i)
     x, y, z = (
@@ -323,9 +329,7 @@ def aim_at_lights(
 
 
 @njit(cache=True, error_model="numpy", _nrt=False)
-def take_light(
-    paths: Paths, shadow: FloatArray, ray: NDArray[np.float32], valid: NDArray[np.int32]
-) -> None:
+def take_light(paths: Paths, shadow: FloatArray, ray: NDArray[np.float32], valid: NDArray[np.int32]) -> None:
     """Count the light of shadow rays that arrived: those that Embree has not ended (at minus infinity)."""
     for i in range(LANES):
         if valid[i] != 0 and ray[RAY_TFAR + i] > 0.0:
@@ -334,9 +338,7 @@ def take_light(
 
 
 @njit(cache=True, error_model="numpy", _nrt=False)
-def leave_lit(
-    bounces: bool, segment: int, paths: Paths, scratch: FloatArray, ray: NDArray[np.float32]
-) -> bool:
+def leave_lit(bounces: bool, segment: int, paths: Paths, scratch: FloatArray, ray: NDArray[np.float32]) -> bool:
     """End the paths that have been lit, or send those from the camera on for a bounce; return whether any flies on."""
     any_flies = False
     rows = paths.numbers

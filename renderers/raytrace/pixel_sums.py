@@ -48,5 +48,3 @@ def _write_pixel(samples: int, row: int, column: int, sums: FloatArray, out: NDA
     for k in range(3):
         out[row, column, k] = np.float32(sums[k] / samples)
         sums[k] = 0.0
-
-

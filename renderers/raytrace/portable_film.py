@@ -62,7 +62,7 @@ class FilmRoom:
         self.scratch, self.rays = np.zeros((packets, SCRATCH_SIZE)), np.zeros((packets, RAY_SIZE), np.float32)
         self.runs, self.heads = np.zeros((packets, LANES, 4), np.int64), np.zeros((packets, 3), np.int64)
         taps = 2 * film.margin + 1
-        self.weights, self.taps = np.zeros((2, taps, LANES)), np.zeros((taps, taps, 4))
+        self.weights, self.taps, self.room = np.zeros((taps, 2 * LANES)), np.zeros((taps, taps, 4)), np.zeros((4, 2 * LANES))
         fill_columns(pattern, film.column, self.keys)
 
     def next_batch(self) -> "Batch | None":
@@ -96,7 +96,8 @@ class Batch:
 
     def add(self) -> None:
         """Add the colours to the film."""
-        _add_all(self.room.film, self.runs, self.heads, self.room.weights, self.room.taps, self.scratch)
+        room = self.room
+        _add_all(room.film, self.runs, self.heads, room.weights, room.taps, room.room, self.scratch)
 
     def start_paths(self) -> None:
         """Start a path for each sample."""
@@ -186,10 +187,11 @@ def _shade_all(tables: Tables, camera: FloatArray, hits: NDArray[np.int32], scra
 
 @njit(cache=True, error_model="numpy", _nrt=False)
 def _add_all(
-    film: Film, runs: IntArray, heads: IntArray, weights: FloatArray, taps: FloatArray, scratch: FloatArray
-) -> None:
+    film: Film, runs: IntArray, heads: IntArray, weights: FloatArray, taps: FloatArray, room: FloatArray,
+    scratch: FloatArray,
+) -> None:  # fmt: skip
     for p in range(len(scratch)):
-        add_runs(film, heads[p, _ROW], runs[p], heads[p, _RUNS], weights, taps, scratch[p])
+        add_runs(film, heads[p, _ROW], runs[p], heads[p, _RUNS], weights, taps, room, scratch[p])
 
 
 @njit(cache=True, error_model="numpy", _nrt=False)

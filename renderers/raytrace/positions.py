@@ -11,6 +11,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from aliasbench.renderers.raytrace.lanes import LANES, PX, PY, TIME
+from aliasbench.renderers.sampling.bits import and32
 from aliasbench.renderers.sampling.hashing import SHARED, combine, permute_power, unit
 from aliasbench.renderers.sampling.patterns import (
     BLUENOISE,
@@ -24,14 +25,16 @@ from aliasbench.renderers.sampling.patterns import (
     Pattern,
     column_order,
     line_order,
+    order_mask,
     own_order,
     pair_position,
     plane_order,
     row_count,
     row_order,
+    sequence_point,
     stream_keys,
 )
-from aliasbench.renderers.sampling.sobol import TABLE_BITS, scrambled_unit, sobol_bits
+from aliasbench.renderers.sampling.sobol import TABLE_BITS, scrambled_unit, shuffled, sobol_bits
 from aliasbench.scenes.model import FloatArray
 
 KeyArray = NDArray[np.uint64]
@@ -101,7 +104,13 @@ def fill_run(
             scratch[PY + lane + k] = top + pattern.cells[1, i]
         return
     first, second = keys[FIRST, place], keys[SECOND, place]
-    if sampler >= SOBOL:
+    if sampler == BLUENOISE:
+        for k in range(run):
+            scratch[PX + lane + k] = left + sequence_point(pattern, 0, index + k, first)
+        for k in range(run):
+            scratch[PY + lane + k] = top + sequence_point(pattern, 1, index + k, second)
+        return
+    if sampler == SOBOL:
         key_x, key_y = np.uint32(first), np.uint32(second)
         if index + run <= _SHORT:
             for k in range(run):
@@ -154,14 +163,19 @@ def fill_positions(
         column, index = column + 1, 0
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
 def _fill_numbers(
     pattern: Pattern, count: int, index: int, lane: int, run: int, order: int, numbers: NDArray[np.int64]
 ) -> None:
     """Write which points of another dimension's set belong to `run` samples from `index` on; see `own_order`."""
     sampler = pattern.sampler
     is_sequence = sampler == SOBOL or (sampler == BLUENOISE and pattern.progressive)
-    if not is_sequence and sampler != RANDOM and count & (count - 1) == 0:
+    if is_sequence:
+        key, mask = np.uint32(order), np.uint32(order_mask(count))
+        for k in range(run):
+            numbers[lane + k] = np.int64(and32(shuffled((index + k) & INDEX_MASK, key), mask))
+        return
+    if sampler not in (RANDOM, BLUENOISE) and count & (count - 1) == 0:
         mask, key = np.uint32(count - 1), np.uint32(order)
         for k in range(run):
             numbers[lane + k] = np.int64(permute_power((index + k) & INDEX_MASK, mask, key))
@@ -180,6 +194,19 @@ def fill_line(
     `key` is the pixel's, `numbers` (LANES,) room for the points' numbers.
     """
     stream, _ = stream_keys(pattern, key, column, row, dimension)
+    order = line_order(pattern, key, column, row, dimension)
+    if run == LANES:
+        # loops of constant length, as in `fill_positions`
+        _fill_line(pattern, count, stream, order, dimension, index, 0, LANES, numbers, scratch, at)
+    else:
+        _fill_line(pattern, count, stream, order, dimension, index, lane, run, numbers, scratch, at)
+
+
+@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+def _fill_line(
+    pattern: Pattern, count: int, stream: int, order: int, dimension: int, index: int, lane: int, run: int,
+    numbers: NDArray[np.int64], scratch: FloatArray, at: int,
+) -> None:  # fmt: skip
     sampler = pattern.sampler
     if sampler == RANDOM:
         for k in range(run):
@@ -187,14 +214,12 @@ def fill_line(
         return
     if sampler == SOBOL and dimension == DIM_TIME:
         for k in range(run):
-            word = np.uint32(index + k)
-            scratch[at + lane + k] = scrambled_unit(sobol_bits(pattern.tables, 2, word), np.uint32(stream))
+            scratch[at + lane + k] = sequence_point(pattern, 2, index + k, stream)
         return
-    _fill_numbers(pattern, count, index, lane, run, line_order(key, dimension), numbers)
+    _fill_numbers(pattern, count, index, lane, run, order, numbers)
     if sampler >= SOBOL:
         for k in range(run):
-            word = np.uint32(numbers[lane + k])
-            scratch[at + lane + k] = scrambled_unit(sobol_bits(pattern.tables, 0, word), np.uint32(stream))
+            scratch[at + lane + k] = sequence_point(pattern, 0, numbers[lane + k], stream)
     elif sampler in (CENTER, GRID):
         for k in range(run):
             scratch[at + lane + k] = (numbers[lane + k] + 0.5) / count
@@ -213,8 +238,19 @@ def fill_plane(
     The samples are index, index + step, ...; see `plane_position`, and `fill_line` for the other parameters.
     """
     first, second = stream_keys(pattern, key, column, row, dimension)
-    order = plane_order(key, dimension)
-    rows = row_count(count)
+    order = plane_order(pattern, key, column, row, dimension)
+    if run == LANES and step == 1:
+        # loops of constant length, as in `fill_positions`
+        _fill_plane(pattern, count, first, second, order, index, 1, 0, LANES, numbers, scratch, at_u, at_v)
+    else:
+        _fill_plane(pattern, count, first, second, order, index, step, lane, run, numbers, scratch, at_u, at_v)
+
+
+@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+def _fill_plane(
+    pattern: Pattern, count: int, first: int, second: int, order: int, index: int, step: int, lane: int, run: int,
+    numbers: NDArray[np.int64], scratch: FloatArray, at_u: int, at_v: int,
+) -> None:  # fmt: skip
     if step == 1:
         _fill_numbers(pattern, count, index, lane, run, order, numbers)
     else:
@@ -222,10 +258,11 @@ def fill_plane(
             numbers[lane + k] = own_order(pattern, count, index + k * step, order)
     if pattern.sampler >= SOBOL:
         for k in range(run):
-            word = np.uint32(numbers[lane + k])
-            scratch[at_u + lane + k] = scrambled_unit(sobol_bits(pattern.tables, 0, word), np.uint32(first))
-            scratch[at_v + lane + k] = scrambled_unit(sobol_bits(pattern.tables, 1, word), np.uint32(second))
+            scratch[at_u + lane + k] = sequence_point(pattern, 0, numbers[lane + k], first)
+        for k in range(run):
+            scratch[at_v + lane + k] = sequence_point(pattern, 1, numbers[lane + k], second)
         return
+    rows = row_count(count)
     for k in range(run):
         u, v = pair_position(pattern, count, rows, numbers[lane + k], index + k * step, first, second)
         scratch[at_u + lane + k], scratch[at_v + lane + k] = u, v

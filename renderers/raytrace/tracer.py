@@ -209,7 +209,7 @@ class PreparedRaytrace:
         bodies = np.zeros((len(exposure.moving), BODY_SIZE))
         for values, body in zip(bodies, exposure.moving, strict=True):
             values[:] = body_values(scene, body, shutter, anchor)
-        lights = light_values(scene, anchor)
+        lights = light_values(scene, shutter.first, anchor)
         tables = build_tables(scene, self._looks, self._still, self._moving, bodies, lights, self._footprint)
         camera = camera_values(scene, shutter, anchor)
         is_adaptive = t.adaptive != "off"

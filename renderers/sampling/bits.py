@@ -70,3 +70,14 @@ def reverse32(typing_context: Any, value: Any) -> Any:  # noqa: ARG001 - numba p
         return builder.call(function, [arguments[0]])
 
     return types.uint32(types.uint32), generate
+
+
+@intrinsic
+def hidden(typing_context: Any, number: Any) -> Any:  # noqa: ARG001 - numba passes it
+    """Return the number through an empty instruction: loops of a known length are unrolled and never vectorised."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:  # noqa: ARG001
+        word = ir.IntType(64)
+        return builder.asm(ir.FunctionType(word, [word]), "", "=r,0", [arguments[0]], False)
+
+    return types.int64(types.int64), generate

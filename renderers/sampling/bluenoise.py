@@ -14,40 +14,44 @@ light than over the floor, so a light's u has to run to the left in the picture,
 costs the gain from 8 samples on, nothing else.
 
 Each seed and frame has the tile in another place, and points below their first 8 bits scrambled anew in each pixel.
-What no offset can change is the mean over the tile: 1 / 64 of a pixel's standard error for any integrand, and less for
-the half spaces, whose mean over the tile vanishes with their low frequencies. A toroidal shift of the points would end
-that too, but strata would then wrap around the square's border, which adds to the error.
+What no offset can change is the mean over the tile. With keys by chance it would be 1 / 64 of a pixel's standard error;
+annealing holds it below that. A toroidal shift of all points would end it, but strata would then wrap around the
+square's border: 20 % more error in penumbrae, and .77 of white noise for .50.
 """
 
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from aliasbench.renderers.sampling.bits import and32, mul32, or32, reverse32, shift_right32
+from aliasbench.renderers.sampling.bits import and32, or32, reverse32
 from aliasbench.renderers.sampling.hashing import combine, frame_key, mix32, pixel_key
 from aliasbench.renderers.sampling.sobol import WordArray, scramble, scrambled_unit, sobol_bits, sobol_tables
 from aliasbench.scenes.model import FloatArray, read_only
+
+Fields = NDArray[np.integer[Any]]
+Tile = NDArray[np.uint64]
 
 LEVELS = (1, 2, 4, 8, 16, 32)
 SIDE = 64
 DATA = Path(__file__).with_name("bluenoise.npz")
 
-# Words of a tile's pixel: the keys of the pixel's pair, those of the second pair, and of the second pair's order. A
-# dimension has a key for each quarter of the unit interval, by the point's unscrambled place: still nested scrambling.
+# Words of a tile's pixel: streams of the pixel's pair and of the second pair, and the key of the second pair's order.
+PIXEL, SECOND, ORDER, WORDS = 0, 2, 4, 5
+# A dimension has a key for each quarter of the unit interval, by the unscrambled point: still nested scrambling.
 QUARTERS = 4
-PIXEL, SECOND, ORDER = 0, QUARTERS, 2 * QUARTERS
-WORDS = 2 * QUARTERS + 1
+# Fields of 16 bits that they are made of: the first quarter's keys of the four dimensions, the other quarters'
+# differences from them, and the order.
 FIELDS = 4 * QUARTERS + 1
 # Bits of a field in which quarters may differ. Bits 0, 1 and 9 say where the quarters go, in all 8 ways that scrambling
 # has, and are common to them; bits 2 to 6 and 10 to 12 move points within one.
 OWN = 0x1C7C
 
-# A scrambled number's first 8 bits depend on these bits of its key, and on no others.
-_FINE = np.uint32(0xFF00FF00)
-_ADDED, _FACTOR, _BYTE, _SIXTEEN = np.uint32(0xFF), np.uint32(0xFF0000), np.uint32(256), np.uint32(16)
+# A scrambled number's first 8 bits depend on the other bits of its key alone.
+_FINE = np.uint64(0xFF00FF00)
 _OFFSETS, _FINE_BITS = 0x51DE, 0xF19E  # streams of their own
 
 
@@ -57,17 +61,14 @@ def tile_level(count: int) -> int:
 
 
 @cache
-def bluenoise_tile(count: int) -> WordArray:
-    """Return the tile for `count` samples, read-only (SIDE, SIDE, WORDS) uint32: row, column, word.
-
-    A word is two fields of 16 bits, of the first dimension in the lower half; see `tile_keys`.
-    """
+def bluenoise_tile(count: int) -> Tile:
+    """Return the tile for `count` samples, read-only (SIDE, SIDE, WORDS) uint64: row, column, word."""
     level = LEVELS[tile_level(count)]
     if level != count:
         return bluenoise_tile(level)
     with np.load(DATA) as data:
-        planes = data[f"level_{level}"]
-    return read_only(words_of(from_planes(planes)).reshape(SIDE, SIDE, WORDS))
+        fields = from_planes(data[f"level_{level}"])
+    return read_only(tile_words(fields).reshape(SIDE, SIDE, WORDS))
 
 
 def to_planes(fields: NDArray[np.uint16]) -> NDArray[np.uint8]:
@@ -81,17 +82,30 @@ def from_planes(planes: NDArray[np.uint8]) -> NDArray[np.uint16]:
     return np.ascontiguousarray((wide[:, 0] | wide[:, 1] << 8).T)
 
 
-def words_of(fields: NDArray[np.uint16]) -> WordArray:
-    """Return (n, WORDS) words of (n, FIELDS) fields of 16 bits.
+@njit(cache=True, nogil=True)
+def fill_words(fields: Fields, out: Tile) -> None:
+    """Write the words of one pixel to `out`, (WORDS,), given its fields, (FIELDS,).
 
-    Four fields are the first quarter's keys x, y of both pairs, then follow the other quarters' differences from them,
-    then the order.
+    A stream has the first quarter's key in bits 0 to 31, and what others differ by in a byte for each quarter above.
     """
-    keys = fields[:, :-1].reshape(-1, QUARTERS, 4).copy()
-    keys[:, 1:] = keys[:, :1] ^ keys[:, 1:] & np.uint16(OWN)
-    wide = keys.astype(np.uint32)
-    pixel, second = wide[:, :, 0] | wide[:, :, 1] << 16, wide[:, :, 2] | wide[:, :, 3] << 16
-    return np.concatenate([pixel, second, fields[:, -1:].astype(np.uint32)], axis=1)
+    for dimension in range(4):
+        field = np.uint64(fields[dimension])
+        stream = field & np.uint64(0xFF) | (field & np.uint64(0xFF00)) << np.uint64(8)
+        for quarter in range(1, QUARTERS):
+            own = np.uint64(fields[4 * quarter + dimension])
+            byte = own >> np.uint64(2) & np.uint64(0x1F) | own >> np.uint64(5) & np.uint64(0xE0)
+            stream |= byte << np.uint64(32 + 8 * quarter)
+        out[dimension] = stream
+    out[ORDER] = np.uint64(fields[FIELDS - 1])
+
+
+@njit(cache=True)
+def tile_words(fields: Fields) -> Tile:
+    """Return (n, WORDS) words of (n, FIELDS) fields."""
+    out = np.empty((len(fields), WORDS), np.uint64)
+    for k in range(len(fields)):
+        fill_words(fields[k], out[k])
+    return out
 
 
 @njit(inline="always", cache=True)
@@ -105,16 +119,21 @@ def tile_offset(start: int, group: int, side: int) -> tuple[int, int]:
 
 
 @njit(inline="always", cache=True)
-def tile_keys(word: np.uint32, fine_x: np.uint32, fine_y: np.uint32) -> tuple[np.uint32, np.uint32]:
-    """Return the Owen keys of a pair's dimensions from a tile's word; points below 2^-8 are the fine keys'."""
-    high = shift_right32(word, _SIXTEEN)
-    key_x = or32(and32(word, _ADDED), and32(mul32(word, _BYTE), _FACTOR))
-    key_y = or32(and32(high, _ADDED), and32(mul32(high, _BYTE), _FACTOR))
-    return or32(key_x, and32(fine_x, _FINE)), or32(key_y, and32(fine_y, _FINE))
+def tile_stream(word: np.uint64, fine: int) -> np.uint64:
+    """Return a dimension's stream from a tile's word, with the bits of a hash that the tile leaves free."""
+    return word | np.uint64(fine) & _FINE
 
 
 @njit(inline="always", cache=True)
-def tile_order(number: int, count: int, word: np.uint32) -> int:
+def quarter_key(stream: np.uint64, reversed_bits: np.uint32) -> np.uint32:
+    """Return the Owen key for a bit-reversed Sobol point of a dimension, given the dimension's stream."""
+    shift = np.uint64(32) + (np.uint64(8) * (np.uint64(reversed_bits) & np.uint64(QUARTERS - 1)))
+    own = stream >> shift
+    return np.uint32(stream ^ ((own & np.uint64(0x1F)) << np.uint64(2)) ^ ((own & np.uint64(0xE0)) << np.uint64(13)))
+
+
+@njit(inline="always", cache=True)
+def tile_order(number: int, count: int, word: np.uint64) -> int:
     """Return where an order of range(count) takes a number; aligned halves, quarters, ... of each block stay together.
 
     Blocks are [0, 1), [1, 2), [2, 4), ... as far as `count` reaches, but those below its highest power of two are one:
@@ -134,29 +153,30 @@ def tile_order(number: int, count: int, word: np.uint32) -> int:
 
 
 @njit(inline="always", cache=True)
-def fine_key(pattern: int, pair: int, dimension: int) -> np.uint32:
-    """Return the bits of a key that no tile fixes, from a pixel's key in this frame."""
-    return np.uint32(combine(combine(pattern, _FINE_BITS), 2 * pair + dimension))
+def fine_key(pattern: int, pair: int, dimension: int) -> np.uint64:
+    """Return the hash for a dimension's `tile_stream` from the pixel's key in this frame."""
+    return combine(combine(pattern, _FINE_BITS), 2 * pair + dimension)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def fill_pair(
-    tables: WordArray, words: WordArray, count: int, second: bool, fine_x: np.uint32, fine_y: np.uint32, out: FloatArray
+    tables: WordArray, words: Tile, count: int, second: bool, fine_x: int, fine_y: int, out: FloatArray
 ) -> None:
     """Write the points of a pair to `out`, (count, 2), given the words of one of the tile's pixels."""
     first = SECOND if second else PIXEL
+    stream_x, stream_y = tile_stream(words[first], fine_x), tile_stream(words[first + 1], fine_y)
     for i in range(count):
         n = np.uint32(tile_order(i, count, words[ORDER]) if second else i)
         x, y = sobol_bits(tables, 0, n), sobol_bits(tables, 1, n)
-        key_x, _ = tile_keys(words[first + int(x) % QUARTERS], fine_x, fine_y)
-        _, key_y = tile_keys(words[first + int(y) % QUARTERS], fine_x, fine_y)
-        out[i, 0], out[i, 1] = scrambled_unit(x, key_x), scrambled_unit(y, key_y)
+        out[i, 0] = scrambled_unit(x, quarter_key(stream_x, x))
+        out[i, 1] = scrambled_unit(y, quarter_key(stream_y, y))
 
 
 @njit(cache=True)
-def _fill_pixel(
-    tables: WordArray, tile: WordArray, count: int, start: int, column: int, row: int, pair: int, out: FloatArray
+def fill_pixel(
+    tables: WordArray, tile: Tile, count: int, start: int, column: int, row: int, pair: int, out: FloatArray
 ) -> None:
+    """Write the points of a pixel's pair to `out`, (count, 2); `start` is the frame's key."""
     side = len(tile)
     right, down = tile_offset(start, max(0, pair - 1), side)
     pattern = pixel_key(start, column, row)
@@ -178,5 +198,5 @@ def bluenoise_set(count: int, *, seed: int = 0, frame: int = 0, pixel: tuple[int
     """
     out = np.empty((count, 2))
     start = int(frame_key(seed, frame))
-    _fill_pixel(sobol_tables(), bluenoise_tile(count), count, start, pixel[0], pixel[1], pair, out)
+    fill_pixel(sobol_tables(), bluenoise_tile(count), count, start, pixel[0], pixel[1], pair, out)
     return out

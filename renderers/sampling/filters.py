@@ -27,6 +27,7 @@ from aliasbench.scenes.model import FloatArray, read_only
 BOX, TENT, CONE, GAUSSIAN, MITCHELL, LANCZOS = 0, 1, 2, 3, 4, 5
 FAR_SIGMAS = 8.3  # beyond it a Gaussian profile has less than 1e-16 of its mass
 _CODE, _RADIUS, _SIGMA, _NORM, _PARTS, _TABLE = 0, 1, 2, 3, 4, 5
+_MITCHELL_ZERO = 4.0 / 7.0  # where its lobe begins, as a share of the radius
 _TERMS = 18  # coefficients of the Lanczos integral in each part of [0, r], for 1e-15
 
 
@@ -111,8 +112,8 @@ class FilterSpec:
         """The integral of abs f: 1, or more with negative lobes."""
         if self.name not in ("mitchell", "lanczos"):
             return 1.0
-        x = np.linspace(-self.radius, self.radius, 4097)
-        steps = np.diff(self.integral(x))
+        zeros = np.arange(1, math.ceil(self.radius)) if self.name == "lanczos" else np.array([self.radius * _MITCHELL_ZERO])
+        steps = np.diff(self.integral(np.concatenate([-zeros[::-1], zeros, [self.radius]])), prepend=0.0)
         return float(np.abs(steps).sum()) ** 2
 
     def evaluate(self, x: FloatArray | float, y: FloatArray | float) -> FloatArray:
@@ -129,6 +130,28 @@ class FilterSpec:
         """Return G(x), the integral of g up to x: 0 at -radius, 1 at radius."""
         a = np.asarray(x, dtype=np.float64)
         return _integral_many(self.params, self._separable(a)).reshape(a.shape)
+
+    def smooth_pieces(self) -> tuple[Callable[[FloatArray], FloatArray], ...]:
+        """Return the profile of a separable filter as functions of x that are smooth on each side of 0.
+
+        They go on beyond the radius as they are within. There is one, but for Mitchell's filter: up to half the radius,
+        and from there on.
+        """
+        r, code = self.radius, self.kind.code
+        if code == MITCHELL:
+            return (
+                lambda x: _mitchell_inner(2.0 * np.abs(x) / r) / (3.0 * r),
+                lambda x: _mitchell_outer(2.0 * np.abs(x) / r) / (3.0 * r),
+            )
+        if code == TENT:
+            return (lambda x: (1.0 - np.abs(x) / r) / r,)
+        if code == GAUSSIAN:
+            return (lambda x: self.peak * np.exp(-0.5 * (x / self.sigma) ** 2),)
+        if code == LANCZOS:
+            return (lambda x: self.peak * np.sinc(x) * np.sinc(x / r),)
+        if code == BOX:
+            return (lambda x: np.full_like(x, 0.5 / r),)
+        raise InputError(f"filter={self.name} is radial: it has no profile along one axis")
 
     def _separable(self, x: FloatArray) -> FloatArray:
         if not self.kind.separable:
@@ -210,6 +233,16 @@ def _lanczos_table(radius: float, norm: float, parts: int, sici: SineIntegral) -
     return np.concatenate(rows)
 
 
+@njit(inline="always", cache=True)
+def _mitchell_inner(u: float) -> float:
+    return (7.0 * u - 12.0) * u * u + 16.0 / 3.0
+
+
+@njit(inline="always", cache=True)
+def _mitchell_outer(u: float) -> float:
+    return ((-7.0 / 3.0 * u + 12.0) * u - 20.0) * u + 32.0 / 3.0
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def profile_at(params: FloatArray, x: float) -> float:
     """Return g(x) of a separable filter given by its `FilterSpec.params`."""
@@ -225,8 +258,8 @@ def profile_at(params: FloatArray, x: float) -> float:
     if code == MITCHELL:
         u = 2.0 * d / radius
         if u < 1.0:
-            return ((7.0 * u - 12.0) * u * u + 16.0 / 3.0) / (3.0 * radius)
-        return (((-7.0 / 3.0 * u + 12.0) * u - 20.0) * u + 32.0 / 3.0) / (3.0 * radius)
+            return _mitchell_inner(u) / (3.0 * radius)
+        return _mitchell_outer(u) / (3.0 * radius)
     if code == LANCZOS:
         return params[_NORM] * _sinc(d) * _sinc(d / radius)
     return 0.5 / radius

@@ -13,7 +13,8 @@ the blurred terms h = K E are kept, so that a proposal costs only the new E of o
 
 The energy alone would also prefer sets with small errors of their own. A multiple of the sum of |E|^2 is subtracted,
 and adjusted after every sweep so that the mean square stays that of random keys: the sampler's error is neither helped
-nor harmed. The means over the tile vanish with the lowest frequency.
+nor harmed. A multiple of the square of the tile's mean of E is added, also for edges over one pair alone: that is the
+sampler's bias over all seeds, which chance alone would leave at 1 / SIDE of a pixel's error.
 
 The same machine and libraries give the same file; others may round differently and end in another tile as good.
 """
@@ -30,12 +31,12 @@ from aliasbench.renderers.sampling.bluenoise import (
     DATA,
     FIELDS,
     LEVELS,
-    ORDER,
     OWN,
-    QUARTERS,
     SIDE,
     WORDS,
+    Tile,
     fill_pair,
+    fill_words,
     to_planes,
 )
 from aliasbench.renderers.sampling.hashing import combine, mix32, unit
@@ -43,7 +44,6 @@ from aliasbench.renderers.sampling.sobol import WordArray, sobol_tables
 from aliasbench.scenes.model import FloatArray
 
 Single = NDArray[np.float32]
-Fields = NDArray[np.uint16]
 
 BLUR_PX = 1.0
 REACH = 4  # of the kernel; G has fallen to e^-4 of its peak there
@@ -63,7 +63,7 @@ class Plan:
     Attributes
     ----------
     fields : tuple of int
-        Which fields of `words_of` are free.
+        Which fields are free.
     terms : int
         Of each edge's series.
     mirrored : float
@@ -88,7 +88,9 @@ PLANS = {
     16: Plan(_ALL_KEYS, 12, 0.0, 900),
     32: Plan(_ONE_KEY, 12, 0.0, 120),
 }
-EDGES = 32
+EDGES = 32  # to be blue
+LONE_EDGES = 16  # over either pair alone, to have no bias
+EVEN = 0.002  # weight of the squared sum over the tile for the lowest frequency, relative to the kernel's peak
 
 
 def edge_family(mirrored: float) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -116,53 +118,51 @@ class Series:
         n.l - a.x in turns of the lowest frequency, over the coordinates (x, l).
     scale, mean : (terms,) float32
         The factor of a term and its expectation before it.
+    even : (terms,) float32
+        The weight of the squared sum of a term over the tile.
     kernel : (2, 2 REACH + 1, 2 REACH + 1, terms) float32
-        K by parts, rows and columns.
+        K by parts, rows and columns; 0 for edges over one pair alone.
     """
 
     direction: Single
     scale: Single
     mean: Single
+    even: Single
     kernel: Single
 
 
 def make_series(plan: Plan) -> Series:
     """Return the terms that a plan's tile is made for."""
     n, a, weight = edge_family(plan.mirrored)
+    angle = math.pi * np.arange(LONE_EDGES) / LONE_EDGES
+    lone, none = np.stack([np.cos(angle), np.sin(angle)], axis=1), np.zeros((LONE_EDGES, 2))
+    n, a = np.concatenate([n, lone, none]), np.concatenate([a, none, lone])
+    blurred = np.arange(len(n)) < len(weight)
+    weight = np.where(blurred, np.resize(weight, len(n)), 1.0)
     vector = np.concatenate([-a, n], axis=1)
     period = np.abs(vector).sum(axis=1)  # outside of it all or nothing is inside the edge
-    turns = np.arange(1, plan.terms + 1)[:, None] / period
+    order = np.arange(1, plan.terms + 1)[:, None]
+    turns = order / period
     mean = np.sinc(turns[:, :, None] * vector).prod(axis=2)
     scale = weight / (2.0 * math.pi * turns * np.sqrt(period))
     d = np.arange(-REACH, REACH + 1)
     blur = np.exp(-(d[:, None] ** 2 + d**2) / (4.0 * BLUR_PX**2)) / (4.0 * math.pi * BLUR_PX**2)
     motion = d[None, :, None] * a[:, 0] + d[:, None, None] * a[:, 1]
-    kernel = blur[:, :, None, None] * np.exp(-2j * math.pi * turns * motion[:, :, None, :])
+    kernel = blurred * blur[:, :, None, None] * np.exp(-2j * math.pi * turns * motion[:, :, None, :])
     kernel = kernel.reshape(len(d), len(d), -1)
     return Series(
         np.ascontiguousarray((vector / period[:, None]).T, dtype=np.float32),
         scale.ravel().astype(np.float32),
         mean.ravel().astype(np.float32),
+        (EVEN * blur.max() * order**2 * np.ones(len(n))).ravel().astype(np.float32),
         np.stack([kernel.real, kernel.imag]).astype(np.float32),
     )
-
-
-@njit(cache=True, nogil=True)
-def _words(fields: NDArray[np.int64], out: WordArray) -> None:
-    """`words_of` of one pixel."""
-    for pair in range(2):
-        x, y = fields[2 * pair], fields[2 * pair + 1]
-        out[pair * QUARTERS] = np.uint32(x | y << 16)
-        for c in range(1, QUARTERS):
-            own_x, own_y = fields[4 * c + 2 * pair], fields[4 * c + 2 * pair + 1]
-            out[pair * QUARTERS + c] = np.uint32((x ^ own_x) | (y ^ own_y) << 16)
-    out[ORDER] = np.uint32(fields[FIELDS - 1])
 
 
 @njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
 def _errors(
     tables: WordArray,
-    words: WordArray,
+    words: Tile,
     count: int,
     direction: Single,
     scale: Single,
@@ -173,9 +173,8 @@ def _errors(
 ) -> None:
     """Write E of one pixel to `out`, (2, terms): real and imaginary parts, up to the factor 1 / i."""
     edges, terms = direction.shape[1], len(scale)
-    zero = np.uint32(0)
-    fill_pair(tables, words, count, False, zero, zero, points[0])
-    fill_pair(tables, words, count, True, zero, zero, points[1])
+    fill_pair(tables, words, count, False, 0, 0, points[0])
+    fill_pair(tables, words, count, True, 0, 0, points[1])
     out[:] = np.float32(0.0)
     for s in range(count):
         x = np.float32((math.floor(points[0, s, 0] * COARSE) + 0.5) / COARSE - 0.5)
@@ -222,38 +221,43 @@ def _sweep(
     mean: Single,
     turn: Single,
     kernel: Single,
+    even: Single,
     keep: float,
     heat: float,
     key: int,
     E: Single,
     h: Single,
 ) -> None:
-    """Propose one change for each pixel on average; `keep` is the multiple of |E|^2 that is subtracted."""
+    """Propose one change for each pixel on average; `keep` is the subtracted share of each pixel's own energy."""
     terms = len(scale)
-    new = np.empty((2, terms), np.float32)
+    new, total = np.empty((2, terms), np.float32), np.zeros((2, terms), np.float32)
     points = np.empty((2, count, 2))
-    trial, words = np.empty(FIELDS, np.int64), np.empty(WORDS, np.uint32)
-    own, spared = kernel[0, REACH, REACH, 0], np.float32(keep)
-    two = np.float32(2.0)
+    trial, words = np.empty(FIELDS, np.int64), np.empty(WORDS, np.uint64)
+    two, spared = np.float32(2.0), np.float32(keep)
+    for pixel in range(SIDE * SIDE):
+        total += E[pixel]
     for step in range(SIDE * SIDE):
         pixel = int(unit(key, 4 * step) * SIDE * SIDE)
         field = free[int(unit(key, 4 * step + 1) * len(free))]
         trial[:] = fields[pixel]
         trial[field] = int(unit(key, 4 * step + 2) * 65536.0) & masks[field]
-        _words(trial, words)
+        fill_words(trial, words)
         _errors(tables, words, count, direction, scale, mean, turn, points, new)
         cost = np.float32(0.0)
         for part in range(2):
             for k in range(terms):
                 old = E[pixel, part, k]
                 d = new[part, k] - old
-                cost += d * (two * h[pixel, part, k] + own * d - spared * (new[part, k] + old))
+                own = kernel[0, REACH, REACH, k]
+                cost += d * (two * h[pixel, part, k] + own * (d - spared * (new[part, k] + old)))
+                cost += d * even[k] * (two * total[part, k] + d)
         if cost < 0.0 or unit(key, 4 * step + 3) < math.exp(-cost / heat):
             fields[pixel, field] = trial[field]
             for part in range(2):
                 for k in range(terms):
                     value = new[part, k]
                     new[part, k] = value - E[pixel, part, k]
+                    total[part, k] += new[part, k]
                     E[pixel, part, k] = value
             _spread(new, pixel, kernel, h)
 
@@ -271,9 +275,9 @@ def _start(
     E: Single,
     h: Single,
 ) -> None:
-    words, points = np.empty(WORDS, np.uint32), np.empty((2, count, 2))
+    words, points = np.empty(WORDS, np.uint64), np.empty((2, count, 2))
     for pixel in range(len(fields)):
-        _words(fields[pixel], words)
+        fill_words(fields[pixel], words)
         _errors(tables, words, count, direction, scale, mean, turn, points, E[pixel])
         _spread(E[pixel], pixel, kernel, h)
 
@@ -284,8 +288,8 @@ def _random_fields(key: int, out: NDArray[np.int64]) -> None:
         out.ravel()[k] = int(mix32(combine(key, k))) >> 16
 
 
-def make_tile(count: int, plan: Plan) -> Fields:
-    """Return the tile for `count` samples as (SIDE^2, FIELDS) fields, see `bluenoise.words_of`."""
+def make_tile(count: int, plan: Plan) -> NDArray[np.uint16]:
+    """Return the tile for `count` samples as (SIDE^2, FIELDS) fields, see `bluenoise.FIELDS`."""
     tables, series, free = sobol_tables(), make_series(plan), np.array(plan.fields)
     angle = 2.0 * math.pi * np.arange(PHASES) / PHASES
     turn = np.stack([np.cos(angle), -np.sin(angle)]).astype(np.float32)
@@ -297,17 +301,20 @@ def make_tile(count: int, plan: Plan) -> Fields:
     E = np.zeros((SIDE * SIDE, 2, len(series.scale)), np.float32)
     h = np.zeros_like(E)
     _start(tables, fields, count, *terms, series.kernel, E, h)
-    # The mean square that random keys have, from the tile of random keys.
-    wanted = float(np.square(E, dtype=np.float64).sum())
-    own = float(series.kernel[0, REACH, REACH, 0])
-    change = 2.0 * own * wanted / SIDE**2
-    keep = 0.5 * own
+    own = series.kernel[0, REACH, REACH]
+    # What random keys have, from the tile of random keys.
+    wanted = _own_energy(E, own)
+    change, keep = 2.0 * wanted / SIDE**2, 0.5
     for k in range(plan.sweeps):
         heat = HOT * (COLD / HOT) ** (k / (plan.sweeps - 1)) * change
         key = int(combine(combine(0x5EED, count), k))
-        _sweep(tables, fields, free, MASKS, count, *terms, series.kernel, keep, heat, key, E, h)
-        keep += 0.5 * own * (1.0 - float(np.square(E, dtype=np.float64).sum()) / wanted)
+        _sweep(tables, fields, free, MASKS, count, *terms, series.kernel, series.even, keep, heat, key, E, h)
+        keep += 0.5 * (1.0 - _own_energy(E, own) / wanted)
     return fields.astype(np.uint16)
+
+
+def _own_energy(E: Single, own: Single) -> float:
+    return float((np.square(E).sum(axis=1).mean(axis=0, dtype=np.float64) * own).sum()) * len(E)
 
 
 def main() -> None:

@@ -22,9 +22,28 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from aliasbench.renderers.sampling._stub import bluenoise_tile, tile_keys, tile_offset
+from aliasbench.renderers.sampling.bluenoise import (
+    ORDER,
+    PIXEL,
+    SECOND,
+    WORDS,
+    Tile,
+    bluenoise_tile,
+    fine_key,
+    quarter_key,
+    tile_offset,
+    tile_order,
+    tile_stream,
+)
 from aliasbench.renderers.sampling.hashing import SHARED, combine, frame_key, permute, pixel_key, unit
-from aliasbench.renderers.sampling.sobol import TABLE_BITS, WordArray, scrambled_unit, shuffled, sobol_bits, sobol_tables
+from aliasbench.renderers.sampling.sobol import (
+    TABLE_BITS,
+    WordArray,
+    scrambled_unit,
+    shuffled,
+    sobol_bits,
+    sobol_tables,
+)
 from aliasbench.scenes.errors import unknown_name
 from aliasbench.scenes.model import FloatArray
 
@@ -66,7 +85,7 @@ class Pattern(NamedTuple):
         Of multijittered samples: row, place in the row, and by how much the row is longer than the shortest.
     tables : (2, 3, 4096) uint32
         See `sobol.sobol_tables`; empty for other samplers.
-    tile : (side, side) uint32
+    tile : (side, side, WORDS) uint64
         See `bluenoise.bluenoise_tile`; empty for other samplers.
     offsets : (DIMENSIONS, 2) int64
         Where each dimension's tile starts, column and row.
@@ -80,7 +99,7 @@ class Pattern(NamedTuple):
     cells: FloatArray
     places: NDArray[np.int32]
     tables: WordArray
-    tile: WordArray
+    tile: Tile
     offsets: NDArray[np.int64]
 
 
@@ -101,7 +120,7 @@ def make_pattern(name: str, count: int, start: int, *, shared: bool, progressive
     """Return the pattern of `count` samples a pixel under a sampler's name; `start` is `frame_key` of seed and frame."""
     code = sampler_code(name)
     cells = np.zeros((4, count))
-    tables, tile = np.zeros((2, 0, 0), np.uint32), np.zeros((0, 0), np.uint32)
+    tables, tile = np.zeros((2, 0, 0), np.uint32), np.zeros((0, 0, WORDS), np.uint64)
     offsets = np.zeros((DIMENSIONS, 2), np.int64)
     places = np.zeros((3, count if code == MULTIJITTERED else 0), np.int32)
     if code == MULTIJITTERED:
@@ -113,7 +132,8 @@ def make_pattern(name: str, count: int, start: int, *, shared: bool, progressive
     if code == BLUENOISE:
         tile = bluenoise_tile(count).copy()  # kernels know writable arrays and others apart
         for dimension in range(DIMENSIONS):
-            offsets[dimension] = tile_offset(np.uint64(start), dimension, len(tile))
+            group = 0 if dimension in (DIM_X, DIM_LIGHT) else dimension  # light and pixel share a place
+            offsets[dimension] = tile_offset(np.uint64(start), group, len(tile))
     return Pattern(code, count, np.uint64(start), shared, progressive, cells, places, tables, tile, offsets)
 
 
@@ -181,15 +201,39 @@ def row_order(row: int, rows: int, stream: int) -> int:
 
 
 @njit(inline="always", cache=True)
+def _tile_word(pattern: Pattern, column: int, row: int, dimension: int, word: int) -> np.uint64:
+    """Return a word of the tile for a dimension of a pixel."""
+    side = len(pattern.tile)
+    return pattern.tile[
+        (row + pattern.offsets[dimension, 1]) % side, (column + pattern.offsets[dimension, 0]) % side, word
+    ]
+
+
+@njit(inline="always", cache=True)
+def sequence_point(pattern: Pattern, dimension: int, number: int, stream: int) -> float:
+    """Return a point of Sobol's sequence in [0, 1), scrambled as the sampler does it with a dimension's stream."""
+    bits = sobol_bits(pattern.tables, dimension, np.uint32(number))
+    if pattern.sampler == BLUENOISE:
+        return scrambled_unit(bits, quarter_key(np.uint64(stream), bits))
+    return scrambled_unit(bits, np.uint32(stream))
+
+
+@njit(inline="always", cache=True)
 def stream_keys(pattern: Pattern, key: int, column: int, row: int, dimension: int) -> tuple[np.uint64, np.uint64]:
     """Return the keys of a dimension and the next for the pixel whose `pixel_key` is `key`."""
     if pattern.sampler == BLUENOISE:
-        side = len(pattern.tile)
-        across = (column + pattern.offsets[dimension, 0]) % side
-        down = (row + pattern.offsets[dimension, 1]) % side
-        first, second = tile_keys(pattern.tile[down, across])
-        return np.uint64(first), np.uint64(second)
+        first = PIXEL if dimension == DIM_X else SECOND
+        return (
+            tile_stream(_tile_word(pattern, column, row, dimension, first), fine_key(key, dimension, 0)),
+            tile_stream(_tile_word(pattern, column, row, dimension, first + 1), fine_key(key, dimension, 1)),
+        )
     return combine(key, dimension), combine(key, dimension + 1)
+
+
+@njit(inline="always", cache=True)
+def order_mask(count: int) -> int:
+    """Return the mask over the numbers of a sequence from which another dimension's `count` are taken."""
+    return _SHORT - 1 if count <= _SHORT else _MOST_NUMBERS - 1
 
 
 @njit(inline="always", cache=True)
@@ -198,8 +242,9 @@ def own_order(pattern: Pattern, count: int, index: int, key: int) -> int:
     if pattern.sampler == RANDOM:
         return index
     if pattern.sampler == SOBOL or (pattern.sampler == BLUENOISE and pattern.progressive):
-        numbers = _SHORT if pattern.count <= _SHORT else _MOST_NUMBERS
-        return int(shuffled(index, np.uint32(key))) & (numbers - 1)
+        return int(shuffled(index, np.uint32(key))) & order_mask(count)
+    if pattern.sampler == BLUENOISE:
+        return tile_order(index, count, np.uint64(key))
     return permute(index, count, key)
 
 
@@ -210,11 +255,7 @@ def pair_position(
     """Return point `number` of a set of `count` in the unit square, for sample `index` and the streams' keys."""
     sampler = pattern.sampler
     if sampler in (SOBOL, BLUENOISE):
-        word = np.uint32(number)
-        return (
-            scrambled_unit(sobol_bits(pattern.tables, 0, word), np.uint32(first)),
-            scrambled_unit(sobol_bits(pattern.tables, 1, word), np.uint32(second)),
-        )
+        return sequence_point(pattern, 0, number, first), sequence_point(pattern, 1, number, second)
     if sampler in (CENTER, GRID):
         return cell_position(number, count, rows, 0.5, 0.5)
     u, v = unit(first, index), unit(second, index)
@@ -228,9 +269,7 @@ def pair_position(
 
 
 @njit(inline="always", cache=True)
-def pixel_position(
-    pattern: Pattern, count: int, rows: int, index: int, first: int, second: int
-) -> tuple[float, float]:
+def pixel_position(pattern: Pattern, count: int, rows: int, index: int, first: int, second: int) -> tuple[float, float]:
     """Return a sample's place in its pixel, x right and y down, both in [0, 1)."""
     if pattern.sampler == CENTER:
         return 0.5, 0.5
@@ -243,7 +282,7 @@ def plane_position(
 ) -> tuple[float, float]:
     """Return a sample's point in the unit square of another pair of dimensions (lens, light, direction).
 
-    `order` is the key of the pair's order, `combine(combine(key, dimension), combine(key, dimension + 1))`.
+    `order` is `plane_order`.
     """
     return pair_position(pattern, count, rows, own_order(pattern, count, index, order), index, first, second)
 
@@ -256,7 +295,7 @@ def line_position(pattern: Pattern, count: int, index: int, stream: int, order: 
         return unit(stream, index)
     number = own_order(pattern, count, index, order)
     if sampler in (SOBOL, BLUENOISE):
-        return scrambled_unit(sobol_bits(pattern.tables, 0, np.uint32(number)), np.uint32(stream))
+        return sequence_point(pattern, 0, number, stream)
     if sampler in (CENTER, GRID):
         return (number + 0.5) / count
     return (number + unit(stream, index)) / count
@@ -269,19 +308,23 @@ def shutter_position(pattern: Pattern, count: int, index: int, stream: int, orde
     The centre and grid samplers take the middle of each stratum; one sample is in the middle of the shutter then.
     """
     if pattern.sampler == SOBOL:
-        return scrambled_unit(sobol_bits(pattern.tables, 2, np.uint32(index)), np.uint32(stream))
+        return sequence_point(pattern, 2, index, stream)
     return line_position(pattern, count, index, stream, order)
 
 
 @njit(inline="always", cache=True)
-def line_order(key: int, dimension: int) -> np.uint64:
+def line_order(pattern: Pattern, key: int, column: int, row: int, dimension: int) -> np.uint64:
     """Return the key of a single dimension's order for the pixel whose `pixel_key` is `key`."""
+    if pattern.sampler == BLUENOISE and not pattern.progressive:
+        return _tile_word(pattern, column, row, dimension, ORDER)
     return combine(combine(key, dimension), _ORDER)
 
 
 @njit(inline="always", cache=True)
-def plane_order(key: int, dimension: int) -> np.uint64:
+def plane_order(pattern: Pattern, key: int, column: int, row: int, dimension: int) -> np.uint64:
     """Return the key of a pair's order for the pixel whose `pixel_key` is `key`."""
+    if pattern.sampler == BLUENOISE and not pattern.progressive:
+        return _tile_word(pattern, column, row, dimension, ORDER)
     return combine(combine(key, dimension), combine(key, dimension + 1))
 
 
@@ -299,13 +342,13 @@ def _fill(pattern: Pattern, column: int, row: int, out: FloatArray) -> None:
         a, b = stream_keys(pattern, key, column, row, DIM_X)
         out[index, 0], out[index, 1] = pixel_position(pattern, count, rows, index, a, b)
         a, _ = stream_keys(pattern, key, column, row, DIM_TIME)
-        out[index, 2] = shutter_position(pattern, count, index, a, line_order(key, DIM_TIME))
+        out[index, 2] = shutter_position(pattern, count, index, a, line_order(pattern, key, column, row, DIM_TIME))
         for pair in (DIM_LENS, DIM_LIGHT, DIM_DIRECTION):
             a, b = stream_keys(pattern, key, column, row, pair)
-            x, y = plane_position(pattern, count, rows, index, a, b, plane_order(key, pair))
+            x, y = plane_position(pattern, count, rows, index, a, b, plane_order(pattern, key, column, row, pair))
             out[index, pair], out[index, pair + 1] = x, y
         a, _ = stream_keys(pattern, key, column, row, DIM_WAVELENGTH)
-        out[index, DIM_WAVELENGTH] = line_position(pattern, count, index, a, line_order(key, DIM_WAVELENGTH))
+        out[index, DIM_WAVELENGTH] = line_position(pattern, count, index, a, line_order(pattern, key, column, row, DIM_WAVELENGTH))
 
 
 def sample_set(

@@ -23,6 +23,7 @@ from llvmlite import ir
 from numba import njit, types
 from numba.extending import intrinsic
 
+from aliasbench.renderers.sampling.bits import hidden
 from aliasbench.renderers.sampling.filters import BOX, CONE, GAUSSIAN, TENT, FilterSpec, filter_of
 from aliasbench.renderers.technique import Technique
 from aliasbench.scenes.model import FloatArray, read_only
@@ -256,17 +257,6 @@ def _float_of(typing_context: Any, bits: Any) -> Any:  # noqa: ARG001 - numba pa
     return types.float64(types.uint64), generate
 
 
-@intrinsic
-def _hidden(typing_context: Any, number: Any) -> Any:  # noqa: ARG001 - numba passes it
-    """Return the number through an empty instruction: loops of a known length are unrolled and never vectorised."""
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:  # noqa: ARG001
-        word = ir.IntType(64)
-        return builder.asm(ir.FunctionType(word, [word]), "", "=r,0", [arguments[0]], False)
-
-    return types.int64(types.int64), generate
-
-
 @njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
 def _look_up(table: FloatArray, first: np.uint64, mass: float, shift: np.uint64) -> float:
     """Return the tabulated value at mass * 2^shift in [_SMALLEST, 1], of the piece whose rows start at `first`."""
@@ -411,7 +401,7 @@ def warp_lanes(warp: Warp, scratch: FloatArray, x_at: int, y_at: int, sign_at: i
     lanes : int
         How many.
     """
-    lanes = _hidden(lanes)
+    lanes = hidden(lanes)
     code, params = warp.code, warp.params
     extent = params[_EXTENT]
     if code == DISC:

@@ -4,47 +4,135 @@ import numpy as np
 import pytest
 
 from aliasbench.renderers.raytrace.embree import Device, EmbreeError, TriangleScene, embree_info
-from aliasbench.renderers.raytrace.lanes import (
-    LANES,
-    PX,
-    PY,
-    SCRATCH_SIZE,
-    TIME,
-    aligned_floats,
-    build_sampling,
+from aliasbench.renderers.raytrace.lanes import LANES, PX, PY, SCRATCH_SIZE, TIME, aligned_floats
+from aliasbench.renderers.raytrace.positions import (
+    KEY_ROWS,
+    PIXEL,
+    KeyArray,
     fill_columns,
     fill_keys,
+    fill_line,
+    fill_plane,
     fill_positions,
     fill_times,
+    orders_size,
 )
 from aliasbench.renderers.raytrace.trig import cos_turns, sin_turns
 from aliasbench.renderers.sampling.hashing import frame_key
-from aliasbench.renderers.sampling.patterns import SAMPLERS, sample_set
+from aliasbench.renderers.sampling.patterns import (
+    DIM_DIRECTION,
+    DIM_LENS,
+    DIM_LIGHT,
+    DIM_TIME,
+    DIM_WAVELENGTH,
+    SAMPLERS,
+    Pattern,
+    make_pattern,
+    sample_set,
+)
+from aliasbench.scenes.model import FloatArray
+
+NAMES = tuple(name for name in SAMPLERS if name != "bluenoise")
+COUNTS = (1, 3, 7, 16, 50, 4096 + 5)
+WIDTH, FIRST_COLUMN, ROW = 3, 4, 9
+SEED, FRAME = 11, 4
 
 
-@pytest.mark.parametrize("name", SAMPLERS)
-@pytest.mark.parametrize("count", [1, 3, 7, 16, 50])
+def make_keys(pattern: Pattern, first_column: int) -> KeyArray:
+    """Return the keys of `WIDTH` pixels of row `ROW`."""
+    keys = np.zeros((KEY_ROWS, WIDTH), np.uint64)
+    fill_columns(pattern, first_column, keys)
+    fill_keys(pattern, first_column, ROW, keys)
+    return keys
+
+
+def make_test_pattern(name: str, count: int, shared: bool) -> Pattern:
+    return make_pattern(name, count, frame_key(SEED, FRAME), shared=shared)
+
+
+def expected_sets(name: str, count: int, first_column: int, shared: bool) -> FloatArray:
+    """Return the sets of `WIDTH` pixels of row `ROW` by definition, (WIDTH, count, 10)."""
+    pixels = [{} if shared else {"pixel": (first_column + k, ROW)} for k in range(WIDTH)]
+    return np.stack([sample_set(name, count, seed=SEED, frame=FRAME, **pixel) for pixel in pixels])
+
+
+def runs_of(count: int) -> list[tuple[int, int, int]]:
+    """Return (first sample, first lane, lanes) of pieces of a pixel's samples in any order, as packets cut them."""
+    pieces, index, lane = [], 0, 5
+    while index < count:
+        run = min(LANES - lane, count - index)
+        pieces.append((index, lane, run))
+        index, lane = index + run, 0
+    return [pieces[k] for k in np.random.default_rng(count).permutation(len(pieces))]
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("count", COUNTS)
 @pytest.mark.parametrize("shared", [False, True])
-def test_packets_hold_the_samples_of_the_shared_definition(name: str, count: int, shared: bool) -> None:
-    pattern = build_sampling(name, count, frame_key(11, 4), shared=shared)
-    width, row = 5, 9
-    keys = np.zeros((4, width), np.uint64)
-    fill_columns(pattern, keys)
-    fill_keys(pattern, row, keys)
+def test_packets_hold_the_places_and_times_of_the_shared_definition(name: str, count: int, shared: bool) -> None:
+    pattern = make_test_pattern(name, count, shared)
+    keys = make_keys(pattern, 0)
+    orders, numbers = np.zeros((3, orders_size(pattern)), np.int32), np.zeros(LANES, np.int64)
     got = []
-    for start in range(0, width * count, LANES):
-        lanes = min(LANES, width * count - start)
-        scratch = np.zeros(SCRATCH_SIZE)
-        fill_positions(pattern, keys, row, start, lanes, scratch)
-        fill_times(pattern, keys, start, lanes, scratch)
+    for start in range(0, WIDTH * count, LANES):
+        lanes = min(LANES, WIDTH * count - start)
+        scratch = np.full(SCRATCH_SIZE, np.nan)
+        fill_positions(pattern, keys, ROW, start, lanes, orders, scratch)
+        fill_times(pattern, keys, ROW, start, lanes, numbers, scratch)
         got.append(np.stack([scratch[at : at + lanes] for at in (PX, PY, TIME)], axis=1))
-    expected = []
-    for column in range(width):
-        pixel = {} if shared else {"pixel": (column, row)}
-        places = sample_set(name, count, seed=11, frame=4, **pixel)[:, :3]
-        expected.append(places + np.array([column, row, 0.0]))
+    expected = expected_sets(name, count, 0, shared)[..., :3]
+    expected[..., 0] += np.arange(WIDTH)[:, None]
+    expected[..., 1] += ROW
     # The cells are a table here: position = corner + size * u rounds differently by an ulp.
-    np.testing.assert_allclose(np.concatenate(got), np.concatenate(expected), rtol=0, atol=4e-15)
+    np.testing.assert_allclose(np.concatenate(got), expected.reshape(-1, 3), rtol=0, atol=4e-15)
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("count", COUNTS)
+@pytest.mark.parametrize("shared", [False, True])
+def test_any_run_of_samples_has_the_other_dimensions_of_the_shared_definition(
+    name: str, count: int, shared: bool
+) -> None:
+    pattern = make_test_pattern(name, count, shared)
+    keys = make_keys(pattern, FIRST_COLUMN)
+    numbers = np.zeros(LANES, np.int64)
+    got = np.full((WIDTH, count, 10), np.nan)
+    scratch = np.full(2 * LANES, np.nan)
+    for k in range(WIDTH):
+        address = (pattern, count, keys[PIXEL, k], FIRST_COLUMN + k, ROW)
+        for index, lane, run in runs_of(count):
+            for line in (DIM_TIME, DIM_WAVELENGTH):
+                fill_line(*address, line, index, lane, run, numbers, scratch, 0)
+                got[k, index : index + run, line] = scratch[lane : lane + run]
+            for plane in (DIM_LENS, DIM_LIGHT, DIM_DIRECTION):
+                fill_plane(*address, plane, index, 1, lane, run, numbers, scratch, 0, LANES)
+                for half in range(2):
+                    at = half * LANES + lane
+                    got[k, index : index + run, plane + half] = scratch[at : at + run]
+    np.testing.assert_array_equal(got[..., 2:], expected_sets(name, count, FIRST_COLUMN, shared)[..., 2:])
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize(("count", "shadow_rays"), [(1, 4), (3, 3), (7, 2), (16, 4), (50, 5), (4096, 4), (4096 + 5, 2)])
+@pytest.mark.parametrize("shared", [False, True])
+def test_shadow_rays_take_turns_in_one_set_of_all_light_points(
+    name: str, count: int, shadow_rays: int, shared: bool
+) -> None:
+    pattern = make_test_pattern(name, count, shared)
+    keys = make_keys(pattern, FIRST_COLUMN)
+    numbers, scratch = np.zeros(LANES, np.int64), np.full(2 * LANES, np.nan)
+    size = count * shadow_rays
+    got = np.full((WIDTH, size, 2), np.nan)
+    for column in range(WIDTH):
+        address = (pattern, size, keys[PIXEL, column], FIRST_COLUMN + column, ROW, DIM_LIGHT)
+        for index, lane, run in runs_of(count):
+            for k in range(shadow_rays):
+                first, after = index * shadow_rays + k, (index + run) * shadow_rays
+                fill_plane(*address, first, shadow_rays, lane, run, numbers, scratch, 0, LANES)
+                got[column, first:after:shadow_rays] = scratch.reshape(2, LANES)[:, lane : lane + run].T
+    expected = expected_sets(name, size, FIRST_COLUMN, shared)[..., DIM_LIGHT : DIM_LIGHT + 2]
+    np.testing.assert_array_equal(got, expected)
+    assert len(np.unique(got[0], axis=0)) == size
 
 
 def test_sine_and_cosine_of_turns_are_exact_to_the_last_bits() -> None:

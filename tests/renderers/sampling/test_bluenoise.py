@@ -1,0 +1,281 @@
+"""Laws of the blue-noise sampler, and its purpose in a model of a penumbra."""
+
+import math
+from collections.abc import Callable
+from functools import cache
+
+import numpy as np
+import pytest
+from numba import njit
+from numpy.typing import NDArray
+from scipy import ndimage, stats
+
+from aliasbench.renderers.sampling import make_bluenoise
+from aliasbench.renderers.sampling.bluenoise import (
+    DATA,
+    FIELDS,
+    LEVELS,
+    OWN,
+    SIDE,
+    WORDS,
+    Tile,
+    bluenoise_set,
+    bluenoise_tile,
+    fill_pixel,
+    from_planes,
+    tile_offset,
+    tile_order,
+    tile_words,
+    to_planes,
+)
+from aliasbench.renderers.sampling.hashing import frame_key
+from aliasbench.renderers.sampling.sobol import WordArray, sobol_tables
+from aliasbench.scenes.model import FloatArray
+
+COUNTS = (1, 2, 3, 4, 5, 7, 8, 10, 16, 17, 32, 64)
+SIZE = 2 * SIDE
+SLOPES = (0.06, 0.1, 0.16)  # penumbrae of 17, 10 and 6 pixels
+ANGLES_DEG = (21.6, 45.0, 111.6)
+
+
+@njit
+def _picture(tables: WordArray, tile: Tile, count: int, start: int, size: int, pair: int) -> FloatArray:
+    out = np.empty((size, size, count, 2))
+    for row in range(size):
+        for column in range(size):
+            fill_pixel(tables, tile, count, start, column, row, pair, out[row, column])
+    return out
+
+
+def picture(tile: Tile, count: int, *, seed: int, pair: int, size: int = SIZE) -> FloatArray:
+    """Points (row, column, sample, 2) of all pixels of a square picture."""
+    points: FloatArray = _picture(sobol_tables(), tile, count, int(frame_key(seed, 0)), size, pair)
+    return points
+
+
+@cache
+def random_tile(seed: int) -> Tile:
+    """A tile of keys as `make_bluenoise` has them before it starts."""
+    fields = np.random.default_rng(seed).integers(0, 1 << 16, (SIDE * SIDE, FIELDS), dtype=np.uint16)
+    fields[:, 4:-1] &= np.uint16(OWN)
+    words: Tile = tile_words(fields)
+    return words.reshape(SIDE, SIDE, WORDS)
+
+
+def half_plane_area(normal: FloatArray, slope: FloatArray) -> Callable[[FloatArray], FloatArray]:
+    """P(n.l - a.x < t) for l and x uniform over centred unit squares: a sum of four independent uniform numbers.
+
+    By inclusion and exclusion over the signs of the widths w_k: sum of prod(s) (t + s.w / 2)_+^4 / (4! prod w).
+    """
+    widths = np.abs(np.concatenate([normal, slope]))
+    signs = np.array(np.meshgrid(*[[-1.0, 1.0]] * 4)).reshape(4, -1)
+
+    def area(t: FloatArray) -> FloatArray:
+        reach = np.maximum(0.0, t[..., None] + 0.5 * (widths @ signs)) ** 4
+        return np.asarray((reach * signs.prod(axis=0)).sum(axis=-1) / (24.0 * widths.prod()))
+
+    return area
+
+
+def penumbra_errors(tile: Callable[[int], Tile], count: int, angle_deg: float, slope: float, seed: int) -> FloatArray:
+    """Errors of a picture of nothing but penumbrae whose edges have one direction.
+
+    The lit part of the light is n.l < t, where t = t0 + a.p and p is the whole place in the picture.
+    """
+    normal = np.array([math.cos(math.radians(angle_deg)), math.sin(math.radians(angle_deg))])
+    a = slope * normal
+    half = 0.5 * float(np.abs(normal).sum() + np.abs(a).sum())
+    row, column = np.mgrid[0:SIZE, 0:SIZE]
+    first = np.random.default_rng(seed).uniform(0.0, 2.0 * half)
+    t = (first + a[0] * column + a[1] * row) % (2.0 * half) - half
+    place = picture(tile(seed), count, seed=seed, pair=0) - 0.5
+    light = picture(tile(seed), count, seed=seed, pair=1) - 0.5
+    lit = light @ normal - place @ a < t[:, :, None]
+    return np.asarray(lit.mean(axis=2) - half_plane_area(normal, a)(t))
+
+
+def blue_ratio(errors: FloatArray) -> float:
+    """Q of METRICS.md section 6, of errors whose expectation is 0."""
+    blurred = ndimage.gaussian_filter(errors, 1.0, mode="wrap", truncate=6.0)
+    impulse = np.zeros((33, 33))
+    impulse[16, 16] = 1.0
+    gain = np.square(ndimage.gaussian_filter(impulse, 1.0, truncate=6.0)).sum()
+    return float(np.square(blurred).mean() / (np.square(errors).mean() * gain))
+
+
+@cache
+def penumbra(count: int, arranged: bool) -> tuple[float, float]:
+    """(Q, RMSE) over angles and slopes, two seeds each."""
+    errors = [
+        penumbra_errors((lambda _: bluenoise_tile(count)) if arranged else random_tile, count, angle, slope, seed)
+        for angle in ANGLES_DEG
+        for slope in SLOPES
+        for seed in (1, 2)
+    ]
+    return float(np.mean([blue_ratio(e) for e in errors])), float(np.sqrt(np.mean(np.square(errors))))
+
+
+def test_the_area_beside_an_edge_is_that_of_many_points() -> None:
+    rng = np.random.default_rng(0)
+    normal, slope = np.array([0.9, 0.436]), np.array([0.09, 0.0436])
+    n = 400_000
+    y = (rng.random((n, 2)) - 0.5) @ normal - (rng.random((n, 2)) - 0.5) @ slope
+    t = np.linspace(-0.7, 0.7, 9)
+    exact = half_plane_area(normal, slope)(t)
+    assert np.all(np.abs((y[:, None] < t).mean(axis=0) - exact) <= 5.0 * np.sqrt(exact * (1 - exact) / n) + 1e-12)
+
+
+@pytest.mark.parametrize(("count", "limit"), [(1, 0.4), (2, 0.5), (4, 0.48), (8, 0.52), (16, 0.57)])
+def test_errors_in_penumbrae_are_blue(count: int, limit: float) -> None:
+    """White noise has 1, with a standard error of about .02 for one picture of 128^2 pixels and .005 for all."""
+    ratio, _ = penumbra(count, arranged=True)
+    print(f"Q {ratio:.3f} at {count}")
+    assert 0.0 < ratio <= limit
+
+
+@pytest.mark.parametrize("count", [1, 4, 16])
+def test_errors_of_random_keys_are_white(count: int) -> None:
+    ratio, _ = penumbra(count, arranged=False)
+    assert 0.93 <= ratio <= 1.07
+
+
+@pytest.mark.parametrize("count", [3, 5, 10, 32])
+def test_other_counts_are_not_worse_than_white(count: int) -> None:
+    ratio, _ = penumbra(count, arranged=True)
+    print(f"Q {ratio:.3f} at {count}")
+    assert ratio <= 0.85
+
+
+@pytest.mark.parametrize("count", [1, 2, 4, 8, 10, 16, 32])
+def test_the_size_of_errors_is_that_of_random_keys(count: int) -> None:
+    _, arranged = penumbra(count, arranged=True)
+    _, independent = penumbra(count, arranged=False)
+    assert arranged == pytest.approx(independent, rel=0.03)
+
+
+@pytest.mark.parametrize("pair", [0, 1, 2])
+@pytest.mark.parametrize("count", [2, 4, 8, 16, 32])
+def test_points_are_a_net(count: int, pair: int) -> None:
+    """Scrambled Sobol points of dimensions 0 and 1: one in every elementary interval of area 1 / N."""
+    points = picture(bluenoise_tile(count), count, seed=3, pair=pair, size=8).reshape(-1, count, 2)
+    bits = int(math.log2(count))
+    for m in range(bits + 1):
+        cell = np.floor(points[..., 0] * 2**m) * 2 ** (bits - m) + np.floor(points[..., 1] * 2 ** (bits - m))
+        assert np.array_equal(np.sort(cell, axis=1), np.broadcast_to(np.arange(count), cell.shape))
+
+
+@pytest.mark.parametrize("count", COUNTS)
+def test_the_second_pairs_order_permutes_and_keeps_the_first_block(count: int) -> None:
+    block = 2 ** int(math.log2(count))
+    seen = set()
+    for key in range(40):
+        order = [tile_order(k, count, np.uint64(key)) for k in range(count)]
+        assert sorted(order) == list(range(count))
+        assert sorted(order[:block]) == list(range(block))
+        seen.add(tuple(order))
+    assert len(seen) == 1 if count == 1 else len(seen) > 1
+
+
+@pytest.mark.parametrize("count", [1, 4, 10, 16])
+@pytest.mark.parametrize("pair", [0, 1, 2])
+def test_points_of_a_pixel_are_uniform_over_seeds(count: int, pair: int) -> None:
+    """Chi-square of cells, and of what is below the 8 bits that a tile fixes.
+
+    A tile has SIDE^2 places; drawn by chance, they would add n / SIDE^2 to the variance of counts of n draws.
+    """
+    draws = 8000 // count
+    points = np.array([bluenoise_set(count, seed=s, pixel=(5, 9), pair=pair) for s in range(draws)])
+    cells = np.floor(points.reshape(-1, 2) * 8.0).astype(int) @ (8, 1)
+    statistic = stats.chisquare(np.bincount(cells, minlength=64)).statistic / (1.0 + draws / SIDE**2)
+    assert stats.chi2.sf(statistic, 63) > 1e-4
+    fine = np.floor(points.reshape(-1, 2) * 4096.0).astype(int) % 16
+    for d in range(2):
+        assert stats.chisquare(np.bincount(fine[:, d], minlength=16)).pvalue > 1e-4
+
+
+@pytest.mark.parametrize("pair", [0, 1])
+@pytest.mark.parametrize("count", LEVELS)
+def test_what_offsets_cannot_change_is_small(count: int, pair: int) -> None:
+    """The mean over a whole tile of a half plane's error, against that of random keys: 1 / SIDE of one pixel's."""
+    points = picture(bluenoise_tile(count), count, seed=0, pair=pair, size=SIDE) - 0.5
+    share = []
+    for angle in np.linspace(0.1, math.pi, 24, endpoint=False):
+        normal = np.array([math.cos(angle), math.sin(angle)])
+        area = half_plane_area(normal, np.array([1e-3, 1e-3]))
+        for t in (-0.3, 0.0, 0.25):
+            errors = (points @ normal < t).mean(axis=2) - float(area(np.array(t)))
+            share.append(errors.mean() / errors.std())
+    bias = np.sqrt(np.mean(np.square(share))) * SIDE
+    print(f"bias {bias:.2f} / SIDE at {count}, pair {pair}")
+    assert 0.0 < bias <= 0.7
+
+
+@pytest.mark.parametrize("pair", [0, 1])
+def test_a_tile_of_single_points_fills_the_square_more_evenly_than_chance(pair: int) -> None:
+    points = picture(bluenoise_tile(1), 1, seed=0, pair=pair, size=SIDE).reshape(-1, 2)
+    counts = np.bincount(np.floor(points * 8.0).astype(int) @ (8, 1), minlength=64)
+    assert stats.chisquare(counts).statistic / 63 < 0.6
+
+
+@pytest.mark.parametrize("count", [1, 4, 16])
+def test_errors_of_far_pixels_do_not_correlate(count: int) -> None:
+    """Correlation of n pixels is 1 / sqrt(n) by chance; of 24 distances none above 4.5 of them."""
+    errors = penumbra_errors(lambda _: bluenoise_tile(count), count, 45.0, 0.1, 7)
+    first = errors / np.sqrt(np.square(errors).mean())
+    for right, down in [(a, b) for a in (0, 12, 19, 27, 31) for b in (0, 13, 20, 26, 30) if a or b]:
+        assert abs((first * np.roll(first, (down, right), (0, 1))).mean()) * SIDE <= 4.5
+
+
+def test_pairs_from_the_third_have_their_own_places_in_the_tile() -> None:
+    places = {group: [tile_offset(int(frame_key(s, 0)), group, SIDE) for s in range(200)] for group in range(4)}
+    for group, values in places.items():
+        columns, rows = np.array(values).T
+        assert columns.min() < 6
+        assert columns.max() >= SIDE - 6
+        assert abs(np.corrcoef(columns, rows)[0, 1]) < 0.3
+        assert all(np.mean([a == b for a, b in zip(values, places[g], strict=True)]) < 0.05 for g in range(group))
+
+
+@pytest.mark.parametrize("pair", [0, 1, 2])
+def test_sets_depend_on_seed_frame_pixel_and_pair_alone(pair: int) -> None:
+    one = bluenoise_set(16, seed=3, frame=2, pixel=(7, 4), pair=pair)
+    assert np.array_equal(one, bluenoise_set(16, seed=3, frame=2, pixel=(7, 4), pair=pair))
+    others = [
+        bluenoise_set(16, seed=4, frame=2, pixel=(7, 4), pair=pair),
+        bluenoise_set(16, seed=3, frame=3, pixel=(7, 4), pair=pair),
+        bluenoise_set(16, seed=3, frame=2, pixel=(8, 4), pair=pair),
+        bluenoise_set(16, seed=3, frame=2, pixel=(7 + SIDE, 4), pair=pair),
+        bluenoise_set(16, seed=3, frame=2, pixel=(7, 4), pair=pair + 1),
+    ]
+    assert not any(np.array_equal(one, other) for other in others)
+    # The same place of the tile: the same points up to what is scrambled anew.
+    assert np.abs(others[3] - one).max() < 2.0**-8
+
+
+def test_a_count_takes_the_tile_of_the_largest_level_below() -> None:
+    for count, level in {1: 1, 2: 2, 3: 2, 4: 4, 7: 4, 8: 8, 10: 8, 31: 16, 32: 32, 64: 32, 1000: 32}.items():
+        assert bluenoise_tile(count) is bluenoise_tile(level)
+    assert len({bluenoise_tile(level).tobytes() for level in LEVELS}) == len(LEVELS)
+    assert all(bluenoise_tile(n).shape == (SIDE, SIDE, WORDS) for n in LEVELS)
+    assert not bluenoise_tile(1).flags.writeable
+
+
+def test_the_data_file_is_small_and_has_the_levels() -> None:
+    assert DATA.stat().st_size < 440_000
+    with np.load(DATA) as data:
+        assert set(data) == {f"level_{n}" for n in LEVELS} == {f"level_{n}" for n in make_bluenoise.PLANS}
+        for name in data:
+            fields = from_planes(data[name])
+            assert fields.shape == (SIDE * SIDE, FIELDS)
+            assert not (fields & ~make_bluenoise.MASKS.astype(np.uint16)).any()
+            assert np.array_equal(to_planes(fields), data[name])
+
+
+@pytest.mark.slow
+def test_annealing_is_repeatable_and_makes_errors_blue() -> None:
+    plan = make_bluenoise.Plan((0, 1, 2, 3), 4, 0.0, 12)
+    one, again = (make_bluenoise.make_tile(1, plan) for _ in range(2))
+    assert np.array_equal(one, again)
+    words: NDArray[np.uint64] = tile_words(one)
+    tile = words.reshape(SIDE, SIDE, WORDS)
+    assert blue_ratio(penumbra_errors(lambda _: tile, 1, 45.0, 0.1, 1)) < 0.75
