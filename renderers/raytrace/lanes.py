@@ -69,6 +69,44 @@ def fill_rays(camera: FloatArray, scratch: FloatArray, ray: NDArray[np.float32])
         write_ray(scratch, ray, i, perspective, ex, ey, ez, px, py, pz, fx, fy, fz)
 
 
+@njit(cache=True, error_model="numpy", _nrt=False)
+def start_rays(camera: FloatArray, scratch: FloatArray, ray: NDArray[np.float32]) -> None:
+    """Write what all rays of a camera that stands still share: the eye, or the direction of parallel rays."""
+    is_pinhole = camera[PERSPECTIVE] == 1.0
+    row, at, shared = (OX, RAY_OX, EYE) if is_pinhole else (DX, RAY_DX, FORWARD)
+    for k in range(3):
+        for i in range(LANES):
+            scratch[row + k * LANES + i] = camera[shared + k]
+            ray[at + k * LANES + i] = np.float32(camera[shared + k])
+
+
+@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+def fill_changing_rays(camera: FloatArray, scratch: FloatArray, ray: NDArray[np.float32]) -> None:
+    """Do what `fill_rays` does where `start_rays` has been and nothing else has written rays since."""
+    if camera[PERSPECTIVE] == 1.0:
+        _fill_rows(camera, scratch, ray, DX, RAY_DX, FORWARD)
+    else:
+        _fill_rows(camera, scratch, ray, OX, RAY_OX, EYE)
+
+
+@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+def _fill_rows(
+    camera: FloatArray, scratch: FloatArray, ray: NDArray[np.float32], row: int, at: int, start: int
+) -> None:
+    """Write the image plane's points, from the camera's value `start` on, into three rows."""
+    step = 1.0 / camera[SCALE]
+    cx, cy = camera[CENTER_X], camera[CENTER_Y]
+    rx, ry, rz = camera[RIGHT], camera[RIGHT + 1], camera[RIGHT + 2]
+    ux, uy, uz = camera[UP], camera[UP + 1], camera[UP + 2]
+    x0, y0, z0 = camera[start], camera[start + 1], camera[start + 2]
+    for i in range(LANES):
+        a = (scratch[PX + i] - cx) * step
+        b = (cy - scratch[PY + i]) * step
+        x, y, z = x0 + (a * rx + b * ux), y0 + (a * ry + b * uy), z0 + (a * rz + b * uz)
+        scratch[row + i], scratch[row + LANES + i], scratch[row + 2 * LANES + i] = x, y, z
+        ray[at + i], ray[at + LANES + i], ray[at + 2 * LANES + i] = np.float32(x), np.float32(y), np.float32(z)
+
+
 @njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
 def camera_moves(camera: FloatArray) -> bool:
     """Return whether the camera is anywhere else at another time of the exposure."""

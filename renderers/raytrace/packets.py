@@ -19,6 +19,7 @@ from aliasbench.renderers.raytrace.kernels import (
     render_static_textured,
 )
 from aliasbench.renderers.raytrace.lanes import (
+    HIT_PRIM,
     LANES,
     RAY_ID,
     RAY_MASK,
@@ -54,14 +55,14 @@ def make_workspace(width: int, pattern: Pattern, margin: int) -> Workspace:
         ids[RAY_ID : RAY_ID + LANES] = np.arange(LANES)
     taps = 2 * margin + 1
     return Workspace(
-        np.zeros(SCRATCH_SIZE),
+        aligned_floats(2 * SCRATCH_SIZE).view(np.float64),
         ray,
         ray.view(np.int32),
         body_ray,
         body_ray.view(np.int32),
         valid,
         arguments,
-        np.zeros(LANES, np.int32),
+        ray.view(np.int32)[HIT_PRIM : HIT_PRIM + LANES],
         np.zeros(3),
         np.zeros((KEY_ROWS, width), np.uint64),
         np.zeros((3, orders_size(pattern)), np.int32),

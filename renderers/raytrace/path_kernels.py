@@ -20,7 +20,6 @@ from aliasbench.renderers.raytrace.kernels import (
 from aliasbench.renderers.raytrace.lanes import (
     HIT_GEOM,
     HIT_INSTANCE,
-    HIT_PRIM,
     LANES,
     LENS_RADIUS,
     RAY_TFAR,
@@ -57,14 +56,13 @@ def _trace_paths(scene: int, scenes: CountArray, tables: Tables, paths: Paths, w
     for i in range(LANES):
         work.ray_ids[HIT_GEOM + i] = NOTHING
         work.ray_ids[HIT_INSTANCE + i] = NOTHING
-        work.ray_ids[HIT_PRIM + i] = MISS
         work.valid[i] = -1 if DONE < paths.states[i] < LIT else 0
+    for i in range(LANES):
+        if work.valid[i] != 0:
+            work.hits[i] = MISS
     work.arguments[0] = 0  # of paths that have been scattered, hardly two go the same way
     if scene != EMPTY:
         intersect16(work.valid.ctypes.data, scene, work.ray.ctypes.data, work.arguments.ctypes.data)
-    for i in range(LANES):
-        if work.valid[i] != 0:
-            work.hits[i] = work.ray_ids[HIT_PRIM + i]
     trace_bodies(scenes, tables, work, -np.inf, np.inf, -np.inf, np.inf)
     work.arguments[0] = _COHERENT
 

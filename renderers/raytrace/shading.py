@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from aliasbench.renderers.raytrace.bodies import lane_to_body
 from aliasbench.renderers.raytrace.ewa import footprint_axes
+from aliasbench.renderers.raytrace.lane_bits import ALL_LANES, equal_lanes, lowest_bit
 from aliasbench.renderers.raytrace.lanes import (
     BLUE,
     DISTANCE,
@@ -129,6 +130,10 @@ def shade_textured(tables: Tables, camera: FloatArray, hits: NDArray[np.int32], 
         place_packet(tables, camera, first, scratch)
         shade_packet(tables.objects, tables.owners[first], tables.levels, tables.texels, scratch)
         return
+    owner = _place_triangles(tables, hits, scratch)
+    if owner != MISS:
+        shade_packet(tables.objects, owner, tables.levels, tables.texels, scratch)
+        return
     owner = tables.owners[first] if first != MISS else MISS
     for i in range(LANES):
         hit = hits[i]
@@ -148,6 +153,41 @@ def shade_textured(tables: Tables, camera: FloatArray, hits: NDArray[np.int32], 
             _paint_lane(tables, hit, scratch, i)
         else:
             shade_lane(tables.objects, tables.owners[hit], tables.levels, tables.texels, scratch, i)
+
+
+@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+def _place_triangles(tables: Tables, hits: NDArray[np.int32], scratch: FloatArray) -> int:
+    """Write texture coordinates of hits on triangles of one object that stands still, triangle by triangle.
+
+    Return the object, or MISS where not all are on one, it has no texture, or levels of detail are needed as well.
+    """
+    if hits[0] == MISS:
+        return MISS
+    owner = tables.owners[hits[0]]
+    if not PLAIN < tables.objects[owner, KIND] < MIPMAP:
+        return MISS
+    todo = ALL_LANES
+    lane = 0
+    while True:
+        hit = hits[lane]
+        if not 0 <= hit < tables.firsts[0] or tables.owners[hit] != owner:
+            return MISS
+        row = tables.triangles[hit]
+        nx, ny, nz, offset = row[0], row[1], row[2], row[OFFSET]
+        ax, ay, az, a0 = row[U_MAP], row[U_MAP + 1], row[U_MAP + 2], row[U_SHIFT]
+        bx, by, bz, b0 = row[V_MAP], row[V_MAP + 1], row[V_MAP + 2], row[V_SHIFT]
+        for i in range(LANES):
+            ox, oy, oz = scratch[OX + i], scratch[OY + i], scratch[OZ + i]
+            dx, dy, dz = scratch[DX + i], scratch[DY + i], scratch[DZ + i]
+            t = (offset - (nx * ox + ny * oy + nz * oz)) / (nx * dx + ny * dy + nz * dz)
+            x, y, z = ox + t * dx, oy + t * dy, oz + t * dz
+            if hits[i] == hit:
+                scratch[U + i] = ax * x + ay * y + az * z + a0
+                scratch[V + i] = bx * x + by * y + bz * z + b0
+        todo &= ~equal_lanes(hits, hit)
+        if todo == 0:
+            return owner
+        lane = lowest_bit(todo)
 
 
 @njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)

@@ -15,6 +15,8 @@ _MULTIPLIER_1 = np.uint64(0x7FEB352D)
 _MULTIPLIER_2 = np.uint64(0x846CA68B)
 _GOLDEN = np.uint64(0x9E3779B9)
 _S15, _S16 = np.uint64(15), np.uint64(16)
+_FIRST, _SECOND, _GOLDEN_WORD = np.uint32(_MULTIPLIER_1), np.uint32(_MULTIPLIER_2), np.uint32(_GOLDEN)
+_FIFTEEN, _SIXTEEN = np.uint32(15), np.uint32(16)
 _TO_UNIT = 2.0**-32
 
 # Pixel coordinates that stand for "all pixels alike".
@@ -41,7 +43,11 @@ def combine(key: int, value: int) -> np.uint64:
 @njit(inline="always", cache=True)
 def unit(key: int, index: int) -> float:
     """Return a number in [0, 1), a multiple of 2^-32, for one index under a key."""
-    return float(mix32((np.uint64(key) + np.uint64(index) * _GOLDEN) & MASK ^ (np.uint64(key) >> _S15))) * _TO_UNIT
+    word = np.uint32(key)
+    x = xor32(add32(word, mul32(np.uint32(index), _GOLDEN_WORD)), shift_right32(word, _FIFTEEN))
+    x = mul32(xor32(x, shift_right32(x, _SIXTEEN)), _FIRST)
+    x = mul32(xor32(x, shift_right32(x, _FIFTEEN)), _SECOND)
+    return float(xor32(x, shift_right32(x, _SIXTEEN))) * _TO_UNIT
 
 
 @njit(inline="always", cache=True)
