@@ -3,8 +3,8 @@
 Adaptive sampling (the lecture's: start small, look at the variance, go on to a tolerance) comes in two forms. `pooled`
 looks at a pixel's own samples and goes on while their standard error is too large: efficient and biased, because a
 pixel whose first samples happen to agree stops with them. `unbiased` never lets the number of a pixel's samples depend
-on those samples: it comes from the pilots of the eight neighbours, which see the same edges, and each pixel keeps its
-own pilot. Where neighbours' samples depend on each other (`pattern=shared`, `sampler=bluenoise`) a pilot of its own
+on those samples: it comes from the pilots of the eight neighbours, which see the same edges (`allocation`), and each
+pixel keeps its own pilot. Where neighbours' samples depend on each other (`pattern=shared`, `sampler=bluenoise`) a pilot of its own
 decides instead, and is discarded.
 
 Under wide filters every sample carries 1 / n of its own pixel, so that no pixel counts more for having more samples:
@@ -12,13 +12,13 @@ each pixel's part of a filter integral is estimated by itself. Samples are taken
 which costs the pilot twice and memory for nothing but their number.
 """
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from aliasbench.renderers.raytrace.allocation import CountArray, neighbour_numbers, next_numbers, resolve_sums, variances
 from aliasbench.renderers.raytrace.film import Film, develop_rows
 from aliasbench.renderers.raytrace.profiles import profile_polynomials
 from aliasbench.renderers.sampling.filters import FilterSpec, filter_of
@@ -29,7 +29,6 @@ from aliasbench.renderers.technique import Technique
 from aliasbench.scenes.errors import InputError
 from aliasbench.scenes.model import FloatArray
 
-CountArray = NDArray[np.int32]
 Expose = Callable[[Pattern, Film], None]
 Progress = Callable[[float], None]
 
@@ -96,6 +95,8 @@ class Development:
     optics : Optics
     expose : callable
         Adds the samples of a pattern to a film.
+    exponent : float
+        See `allocation`.
     progress : callable, optional
         Is told the finished share of the picture.
     """
@@ -105,6 +106,7 @@ class Development:
     pattern: Pattern
     optics: Optics
     expose: Expose
+    exponent: float
     progress: Progress | None = None
 
     def run(self) -> tuple[NDArray[np.float32], CountArray | None]:
@@ -145,8 +147,8 @@ class Development:
                 if film is None:
                     film = self._film(first, -margin, *passes[0], sums=True)
                     self.expose(self.pattern, film)
-                means = film.sums / numbers[..., None]
-                out[first:after] = film.shifts + means if film.shifts.size else means
+                around = (len(film.sums) - len(numbers)) // 2
+                resolve_sums(film, numbers, around, out[first:after])
             if self.progress is not None:
                 self.progress((after + margin) / (height + 2 * margin))
         return out, counts
@@ -203,7 +205,10 @@ class Development:
         return np.divide(window[..., :3], weights, out=np.zeros_like(window[..., :3]), where=weights > 0.0)
 
     def _adapt(self, first: int, after: int) -> tuple[Film, CountArray, list[tuple[CountArray, CountArray]]]:
-        """Return rows of film with the sums of all samples, their numbers, and the passes they were taken in."""
+        """Return rows of film with the sums of all samples, their numbers, and the passes they were taken in.
+
+        The film may have rows and columns around those that the numbers are of.
+        """
         t, margin = self.technique, self.optics.margin
         ring = 1 if t.adaptive == "unbiased" else 0
         shape = (after - first + 2 * ring, self.size[0] + 2 * (margin + ring))
@@ -217,73 +222,38 @@ class Development:
         self.expose(pattern, film)
         if t.adaptive == "pooled":
             return self._pool(film, ends)
-        needed = self._needed(film, ends)
-        inner = (slice(ring, -ring), slice(ring, -ring))
+        numbers = self._needed(film, ends)
+        pilots = np.minimum(t.min_spp, numbers)
         if self._discards:
-            numbers = needed
-            begins, own = np.zeros_like(numbers), self._film(first, -margin, begins, ends, sums=True, squares=True)
-        else:
-            numbers = needed
-            begins = np.minimum(ends[inner], numbers)
-            kept = (np.ascontiguousarray(a[inner]) for a in (film.shifts, film.sums, film.squares))
-            own = self._film(first, -margin, begins, numbers)._replace(
-                **dict(zip(("shifts", "sums", "squares"), kept, strict=True))
-            )
-        own = own._replace(begins=begins, ends=numbers)
+            passes = [(np.zeros_like(numbers), numbers)]
+            film = self._film(first, -margin, *passes[0], sums=True, squares=True)
+            if not self.optics.is_splat:
+                self.expose(self.pattern, film)
+            return film, numbers, passes
         if not self.optics.is_splat:
-            self.expose(self.pattern, own)
-        passes = [(begins, numbers)]
-        if not self._discards:
-            passes = [(np.zeros_like(begins), begins), (begins, numbers)]
-        return own, numbers, passes
+            ends = ends.copy()
+            ends[1:-1, 1:-1] = numbers
+            self.expose(self.pattern, film._replace(begins=film.ends, ends=ends))
+        return film, numbers, [(np.zeros_like(numbers), pilots), (pilots, numbers)]
 
     def _pool(self, film: Film, numbers: CountArray) -> tuple[Film, CountArray, list[tuple[CountArray, CountArray]]]:
         """Take more samples, until their standard error is within the tolerance or there are as many as allowed."""
         t = self.technique
         passes = [(film.begins, film.ends)]
         while True:
-            wanted = self._wanted(_variances(film, numbers), numbers)
-            more = (wanted > numbers) & (numbers < t.max_spp)
-            if not more.any():
+            own, ends = np.empty(numbers.shape), np.empty_like(numbers)
+            variances(film, numbers, own)
+            if not next_numbers(own, numbers, t.tolerance, self.exponent, t.max_spp, ends):
                 return film, numbers, passes
-            ends = np.where(more, np.minimum(np.minimum(wanted, 2 * numbers), t.max_spp), numbers).astype(np.int32)
             self.expose(self.pattern, film._replace(begins=numbers, ends=ends))
             passes.append((numbers, ends))
             numbers = ends
 
-    def _wanted(self, variances: FloatArray, numbers: CountArray) -> NDArray[np.int64]:
-        """Return how many samples bring the standard error to the tolerance; twice as many where none can be told."""
-        with np.errstate(over="ignore"):
-            wanted = np.ceil(variances / self.technique.tolerance**2 - 1e-9)
-        wanted = np.where(numbers < 2, 2 * numbers, wanted)
-        return np.clip(wanted, self.technique.min_spp, self.technique.max_spp).astype(np.int64)
-
     def _needed(self, film: Film, numbers: CountArray) -> CountArray:
-        """Return the numbers of samples inside the film's outermost ring that the pilots of neighbours ask for.
-
-        Discarded pilots ask for their own pixel too. From single samples the variance between neighbours is all there
-        is to see.
-        """
-        rows, columns = numbers.shape
-        shifts = [
-            (slice(1 + i, rows - 1 + i), slice(1 + j, columns - 1 + j))
-            for i in (-1, 0, 1)
-            for j in (-1, 0, 1)
-            if (i, j) != (0, 0) or self._discards
-        ]
-        if self.technique.min_spp == 1:
-            values = np.stack([film.shifts[s] for s in shifts])
-            variances = values.var(axis=0, ddof=1).max(axis=-1)
-        else:
-            own = _variances(film, numbers)
-            variances = np.stack([own[s] for s in shifts]).max(axis=0)
-        enough = np.full(variances.shape, 2, np.int32)
-        return self._wanted(variances, enough).astype(np.int32)
-
-
-def _variances(film: Film, numbers: CountArray) -> FloatArray:
-    """Return the largest variance of the channels of each pixel's samples, infinite of a single one."""
-    n = numbers[..., None].astype(np.float64)
-    spare = np.where(n > 1, n - 1, math.inf)
-    variances: FloatArray = (np.maximum(film.squares - film.sums**2 / n, 0.0) / spare).max(axis=-1)
-    return np.where(numbers > 1, variances, math.inf)
+        """Return the numbers of samples inside the film's outermost ring that pilots ask for."""
+        t = self.technique
+        own = np.empty(numbers.shape)
+        variances(film, numbers, own)
+        out = np.empty((numbers.shape[0] - 2, numbers.shape[1] - 2), np.int32)
+        neighbour_numbers(film, own, t.tolerance, self.exponent, t.min_spp, t.max_spp, self._discards, out)
+        return out

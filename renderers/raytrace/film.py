@@ -18,7 +18,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from aliasbench.renderers.raytrace.lanes import BLUE, GREEN, LANES, PX, PY, RED, SIGN
-from aliasbench.renderers.raytrace.positions import BATCH, PIXEL, KeyArray, fill_run
+from aliasbench.renderers.raytrace.positions import BATCH, PIXEL, SHORT, KeyArray, fill_mixed, fill_run
 from aliasbench.renderers.raytrace.profiles import add_taps, weigh_lanes
 from aliasbench.renderers.sampling.hashing import combine
 from aliasbench.renderers.sampling.patterns import (
@@ -135,7 +135,12 @@ def place_runs(
 ) -> None:  # fmt: skip
     """Write the image positions of a packet's samples, and the signs of their weights."""
     row = film.row + r
-    for n in range(count):
+    if count > 1 and pattern.sampler == SOBOL and pattern.count <= SHORT:
+        fill_mixed(pattern, keys, runs, count, scratch)
+        runs_to_fill = 0
+    else:
+        runs_to_fill = count
+    for n in range(runs_to_fill):
         run = runs[n]
         k, lane, length = run[RUN_PIXEL], run[RUN_LANE], run[RUN_LANES]
         key, size, index = run_address(pattern, film, keys, r, run)

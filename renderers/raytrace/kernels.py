@@ -29,7 +29,6 @@ from aliasbench.renderers.raytrace.lanes import (
     camera_moves,
     fill_changing_rays,
     fill_moving_rays,
-    fill_rays,
     start_rays,
 )
 from aliasbench.renderers.raytrace.pixel_sums import add_samples
@@ -241,6 +240,7 @@ def film_static(
     """Expose the film's rows until there are none left: nothing moves, and there is no lens."""
     textured = len(tables.triangles) > 0
     fill_columns(pattern, film.column, work.keys)
+    start_rays(camera, work.scratch, work.ray)
     while True:
         r = take_next(counter)
         if r >= film.begins.shape[0]:
@@ -252,7 +252,7 @@ def film_static(
             if lanes == 0:
                 break
             place_runs(pattern, film, work.keys, r, work.runs[0], runs, work.orders, work.scratch)
-            fill_rays(camera, work.scratch, work.ray)
+            fill_changing_rays(camera, work.scratch, work.ray)
             trace(scene, work, lanes)
             if textured:
                 shade_textured(tables, camera, work.hits, work.scratch)

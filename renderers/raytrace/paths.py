@@ -25,12 +25,11 @@ from aliasbench.renderers.raytrace.film import (
     run_address,
 )
 from aliasbench.renderers.raytrace.lanes import (
-    BLUE,
     DX,
     DY,
     DZ,
-    GREEN,
     LANES,
+    LENS_X,
     OX,
     OY,
     OZ,
@@ -86,6 +85,8 @@ DONE, FLYING, LEFT_DIFFUSE, REFLECTED, LIT, LIT_LAST = 0, 1, 2, 3, 4, 5
 SHARE, SEEN, PLACE, NORMAL, STEP = 0, 48, 96, 144, 192
 LIGHT_U, LIGHT_V, TURN_U, TURN_V, WAVE, SPLIT = 208, 224, 240, 256, 272, 288
 PATH_SIZE = 304
+# Rows of a shadow ray's scratch for what it brings; in the rows of colours tests for holes leave their alphas.
+BROUGHT = LENS_X
 
 _OFF_SURFACE = 2e-6  # some 30 ulp of float32: twice what intersection may be off
 _BEFORE_LIGHT = 1e-4  # of the way, which shadow rays stop short of their light
@@ -322,7 +323,7 @@ def aim_at_lights(
         shadow[TIME + i] = scratch[TIME + i]
         weight *= light[AREA] * here * there / (np.pi * square * square * light[CHANCE])
         for c in range(3):
-            shadow[RED + c * LANES + i] = weight * light[RADIANCE + c] * rows[SHARE + c * LANES + i]
+            shadow[BROUGHT + c * LANES + i] = weight * light[RADIANCE + c] * rows[SHARE + c * LANES + i]
         valid[i] = -1
         any_valid = True
     return any_valid
@@ -334,7 +335,7 @@ def take_light(paths: Paths, shadow: FloatArray, ray: NDArray[np.float32], valid
     for i in range(LANES):
         if valid[i] != 0 and ray[RAY_TFAR + i] > 0.0:
             for c in range(3):
-                paths.numbers[SEEN + c * LANES + i] += shadow[RED + c * LANES + i]
+                paths.numbers[SEEN + c * LANES + i] += shadow[BROUGHT + c * LANES + i]
 
 
 @njit(cache=True, error_model="numpy", _nrt=False)

@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from aliasbench.renderers.raytrace.lanes import LANES, PX, PY, TIME
+from aliasbench.renderers.raytrace.lanes import LANES, LOD, PX, PY, TIME, U, V
 from aliasbench.renderers.sampling.bits import and32
 from aliasbench.renderers.sampling.hashing import SHARED, combine, permute_power, unit
 from aliasbench.renderers.sampling.patterns import (
@@ -41,7 +41,7 @@ KeyArray = NDArray[np.uint64]
 
 # Over every sample number (2^24 at most): tells the compiler that none is negative, which spares a check for each lane.
 INDEX_MASK = 0x1FFFFFF
-_SHORT = 1 << TABLE_BITS
+SHORT = 1 << TABLE_BITS
 BATCH = 0x5A17  # what the keys of a pixel's later samples are derived with
 
 # Rows of the keys of a row's pixels: of the pixel, of the streams of x and y, and what columns start from.
@@ -112,7 +112,7 @@ def fill_run(
         return
     if sampler == SOBOL:
         key_x, key_y = np.uint32(first), np.uint32(second)
-        if index + run <= _SHORT:
+        if index + run <= SHORT:
             for k in range(run):
                 i = (index + k) & INDEX_MASK
                 scratch[PX + lane + k] = left + scrambled_unit(pattern.tables[0, 0, i], key_x)
@@ -142,6 +142,28 @@ def fill_run(
     for k in range(run):
         i = (index + k) & INDEX_MASK
         scratch[PY + lane + k] = top + (pattern.cells[1, i] + pattern.cells[3, i] * unit(second, i))
+
+
+@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+def fill_mixed(
+    pattern: Pattern, keys: KeyArray, runs: NDArray[np.int64], count: int, scratch: FloatArray
+) -> None:
+    """Write places in their pixels of several pixels' samples at once, of Sobol's sequence up to number SHORT.
+
+    `runs` (count, 4) are rows of pixel, sample, first lane and lanes (`film`).
+    """
+    # keys and numbers pass through float64 lanes, which hold them exactly
+    for n in range(count):
+        k, index, lane, length = runs[n, 0], runs[n, 1], runs[n, 2], runs[n, 3]
+        key_x, key_y = float(np.uint32(keys[FIRST, k])), float(np.uint32(keys[SECOND, k]))
+        for i in range(length):
+            scratch[U + lane + i], scratch[V + lane + i], scratch[LOD + lane + i] = key_x, key_y, float(index + i)
+    for i in range(LANES):
+        word = pattern.tables[0, 0, int(scratch[LOD + i]) & (SHORT - 1)]
+        scratch[PX + i] = scrambled_unit(word, np.uint32(scratch[U + i]))
+    for i in range(LANES):
+        word = pattern.tables[0, 1, int(scratch[LOD + i]) & (SHORT - 1)]
+        scratch[PY + i] = scrambled_unit(word, np.uint32(scratch[V + i]))
 
 
 @njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from aliasbench.renderers.frame import Frame
 from aliasbench.renderers.geometry import build_bodies
+from aliasbench.renderers.raytrace.allocation import error_exponent
 from aliasbench.renderers.raytrace.bodies import BODY_SIZE, body_values
 from aliasbench.renderers.raytrace.development import Development, Progress, is_plain, make_optics
 from aliasbench.renderers.raytrace.exposure import Exposure, plan_exposure
@@ -230,7 +231,8 @@ class PreparedRaytrace:
         def expose(pattern: Pattern, film: Film) -> None:
             self._engine.expose(camera, pattern, tables, has_times, scattering, film)
 
-        return Development(t, self._size, pattern, self._optics, expose, progress).run()
+        exponent = error_exponent(scene, t, pattern.sampler)
+        return Development(t, self._size, pattern, self._optics, expose, exponent, progress).run()
 
     def close(self) -> None:
         """Free what the engine holds (again is harmless)."""
