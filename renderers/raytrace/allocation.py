@@ -23,7 +23,7 @@ from aliasbench.scenes.model import FloatArray, Scene
 
 CountArray = NDArray[np.int32]
 
-_ONE_SIDED = 1.0 / 16.0
+_ONE_SIDED = 0.01
 _LANES = 16
 
 
@@ -38,9 +38,9 @@ def error_exponent(scene: Scene, technique: Technique, sampler: int) -> float:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def variances(film: Film, numbers: CountArray, out: FloatArray) -> None:
-    """Write the largest variance of the channels of each pixel's samples, infinite of a single one."""
-    for r in range(numbers.shape[0]):
+def variances(first: int, after: int, film: Film, numbers: CountArray, out: FloatArray) -> None:
+    """Write the largest variance of the channels of each pixel's samples, infinite of a single one, in some rows."""
+    for r in range(first, after):
         for k in range(numbers.shape[1]):
             n = numbers[r, k]
             largest = 0.0
@@ -79,12 +79,15 @@ def next_numbers(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def neighbour_numbers(
-    film: Film, own: FloatArray, tolerance: float, exponent: float, least: int, most: int, alone: bool, out: CountArray
-) -> None:
+    first: int, after: int, film: Film, own: FloatArray, tolerance: float, exponent: float, least: int, most: int,
+    alone: bool, out: CountArray,
+) -> None:  # fmt: skip
     """Write the numbers of samples of all pixels but a film's outermost ring, from the pilots around them.
 
     Parameters
     ----------
+    first, after : int
+        The rows of `out` to write.
     film : Film
         With the sums of pilots of `least` samples.
     own : (rows, width) float64
@@ -93,7 +96,7 @@ def neighbour_numbers(
         The pilots are discarded, so that the pixel's own may count.
     out : (rows - 2, width - 2) int32
     """
-    for r in range(out.shape[0]):
+    for r in range(first, after):
         for k in range(out.shape[1]):
             y, x = r + 1, k + 1
             across = _gap(film, least, y, x - 1, y, x + 1)
@@ -104,10 +107,9 @@ def neighbour_numbers(
                     across = 0.0
                 if above > 0.0 or below > 0.0:
                     along = 0.0
-                first, second = max(left, right), min(left, right)
-                third, fourth = max(above, below), min(above, below)
-                largest = max(first, third)
-                variance = max(min(first, third), second, fourth, _ONE_SIDED * largest)
+                a, b = max(left, right), max(above, below)
+                second = max(min(a, b), min(left, right), min(above, below))
+                variance = max(second, _ONE_SIDED * max(a, b))
                 if alone:
                     variance = max(variance, own[y, x])
             else:
@@ -132,10 +134,12 @@ def _gap(film: Film, least: int, y0: int, x0: int, y1: int, x1: int) -> float:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def resolve_sums(film: Film, numbers: CountArray, around: int, out: NDArray[np.float32]) -> None:
+def resolve_sums(
+    first: int, after: int, film: Film, numbers: CountArray, around: int, out: NDArray[np.float32]
+) -> None:
     """Write means of `numbers` (h, w) samples to an image (h, w, 3); the film has so many pixels more all around."""
     shifted = film.shifts.shape[0] > 0
-    for r in range(out.shape[0]):
+    for r in range(first, after):
         for k in range(out.shape[1]):
             n = numbers[r, k]
             for c in range(3):

@@ -12,6 +12,7 @@ each pixel's part of a filter integral is estimated by itself. Samples are taken
 which costs the pilot twice and memory for nothing but their number.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -30,6 +31,7 @@ from aliasbench.scenes.errors import InputError
 from aliasbench.scenes.model import FloatArray
 
 Expose = Callable[[Pattern, Film], None]
+Spread = Callable[..., None]
 Progress = Callable[[float], None]
 
 _GROUP_BYTES = 64 << 20
@@ -83,6 +85,25 @@ def is_plain(technique: Technique) -> bool:
     return technique.adaptive == "off" and not optics.is_splat and optics.warp.code == IDENTITY
 
 
+class Room:
+    """Memory of film that is used again for the next rows and pictures: fresh memory costs as much as the samples."""
+
+    __slots__ = ("_arrays",)
+
+    def __init__(self) -> None:
+        self._arrays: dict[str, FloatArray] = {}
+
+    def zeros(self, name: str, shape: tuple[int, ...]) -> FloatArray:
+        """Return zeros of a shape, and forget what was kept under the name before."""
+        size = math.prod(shape)
+        held = self._arrays.get(name)
+        if held is None or held.size < size:
+            held = self._arrays[name] = np.zeros(size)
+        out = held[:size].reshape(shape)
+        out.fill(0.0)
+        return out
+
+
 @dataclass(slots=True, eq=False)
 class Development:
     """One picture on its way: what exposes film, with which pattern and optics.
@@ -95,8 +116,13 @@ class Development:
     optics : Optics
     expose : callable
         Adds the samples of a pattern to a film.
+    spread : callable
+        Calls a function with the first row of a part of so many rows and the one after, and what else it needs, for
+        all parts.
     exponent : float
         See `allocation`.
+    room : Room
+        Where film is kept from one picture to the next.
     progress : callable, optional
         Is told the finished share of the picture.
     """
@@ -106,7 +132,9 @@ class Development:
     pattern: Pattern
     optics: Optics
     expose: Expose
+    spread: Spread
     exponent: float
+    room: Room
     progress: Progress | None = None
 
     def run(self) -> tuple[NDArray[np.float32], CountArray | None]:
@@ -148,7 +176,7 @@ class Development:
                     film = self._film(first, -margin, *passes[0], sums=True)
                     self.expose(self.pattern, film)
                 around = (len(film.sums) - len(numbers)) // 2
-                resolve_sums(film, numbers, around, out[first:after])
+                self.spread(resolve_sums, after - first, film, numbers, around, out[first:after])
             if self.progress is not None:
                 self.progress((after + margin) / (height + 2 * margin))
         return out, counts
@@ -173,11 +201,11 @@ class Development:
             column,
             begins,
             ends,
-            np.zeros((rows, columns, 3)) if squares else empty,
-            np.zeros((rows, columns, 3)) if sums else empty,
-            np.zeros((rows, columns, 3)) if squares else empty,
+            self.room.zeros("shifts", (rows, columns, 3)) if squares else empty,
+            self.room.zeros("sums", (rows, columns, 3)) if sums else empty,
+            self.room.zeros("squares", (rows, columns, 3)) if squares else empty,
             np.zeros((0, 0)) if numbers is None else 1.0 / numbers,
-            np.zeros((0, 0, 0, 0)) if numbers is None else np.zeros((rows, taps, self.size[0], 4)),
+            np.zeros((0, 0, 0, 0)) if numbers is None else self.room.zeros("splats", (rows, taps, self.size[0], 4)),
             optics.margin,
             optics.spec.radius,
             optics.spread,
@@ -242,7 +270,7 @@ class Development:
         passes = [(film.begins, film.ends)]
         while True:
             own, ends = np.empty(numbers.shape), np.empty_like(numbers)
-            variances(film, numbers, own)
+            self.spread(variances, len(own), film, numbers, own)
             if not next_numbers(own, numbers, t.tolerance, self.exponent, t.max_spp, ends):
                 return film, numbers, passes
             self.expose(self.pattern, film._replace(begins=numbers, ends=ends))
@@ -253,7 +281,8 @@ class Development:
         """Return the numbers of samples inside the film's outermost ring that pilots ask for."""
         t = self.technique
         own = np.empty(numbers.shape)
-        variances(film, numbers, own)
+        self.spread(variances, len(own), film, numbers, own)
         out = np.empty((numbers.shape[0] - 2, numbers.shape[1] - 2), np.int32)
-        neighbour_numbers(film, own, t.tolerance, self.exponent, t.min_spp, t.max_spp, self._discards, out)
+        rest = (film, own, t.tolerance, self.exponent, t.min_spp, t.max_spp, self._discards, out)
+        self.spread(neighbour_numbers, len(out), *rest)
         return out

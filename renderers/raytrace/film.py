@@ -166,9 +166,14 @@ def place_runs(
     for n in range(count):
         run = runs[n]
         x = film.column + run[RUN_PIXEL] + 0.5
-        for i in range(run[RUN_LANE], run[RUN_LANE] + run[RUN_LANES]):
-            scratch[PX + i] += x
-            scratch[PY + i] += row + 0.5
+        if run[RUN_LANES] == LANES:
+            for i in range(LANES):
+                scratch[PX + i] += x
+        else:
+            for i in range(run[RUN_LANE], run[RUN_LANE] + run[RUN_LANES]):
+                scratch[PX + i] += x
+    for i in range(LANES):
+        scratch[PY + i] += row + 0.5
 
 
 @njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
@@ -218,7 +223,7 @@ def _clear(taps: FloatArray) -> None:
 @njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
 def _sum_run(film: Film, r: int, run: IntArray, scratch: FloatArray) -> None:
     k, lane, length = run[RUN_PIXEL], run[RUN_LANE], run[RUN_LANES]
-    if film.squares.shape[0] == 0:
+    if film.shifts.shape[0] == 0:
         for c in range(3):
             at = RED + c * LANES
             total = film.sums[r, k, c]
@@ -237,10 +242,17 @@ def _sum_run(film: Film, r: int, run: IntArray, scratch: FloatArray) -> None:
             film.shifts[r, k, c] = scratch[at + lane]
         shift = film.shifts[r, k, c]
         total, square = 0.0, 0.0
-        for i in range(lane, lane + length):
-            d = scratch[at + i] - shift
-            total += d
-            square += d * d
+        if length == LANES:
+            for i in range(4):
+                d0, d1 = scratch[at + i] - shift, scratch[at + i + 4] - shift
+                d2, d3 = scratch[at + i + 8] - shift, scratch[at + i + 12] - shift
+                total += (d0 + d1) + (d2 + d3)
+                square += (d0 * d0 + d1 * d1) + (d2 * d2 + d3 * d3)
+        else:
+            for i in range(lane, lane + length):
+                d = scratch[at + i] - shift
+                total += d
+                square += d * d
         film.sums[r, k, c] += total
         film.squares[r, k, c] += square
 

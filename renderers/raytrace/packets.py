@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -149,6 +150,16 @@ class PacketEngine:
         elif moving:
             handles = (self._still_handle, self._handles)
         self._run(kernel, (*handles, camera, pattern, tables), film.begins.shape[1], film.margin, film, None)
+
+    def spread(self, function: Callable[..., None], rows: int, *arguments: object) -> None:
+        """Call a function of the first row and the one after of each part of `rows`, on every thread."""
+        borders = [rows * k // self._threads for k in range(self._threads + 1)]
+        parts = [(a, b) for a, b in pairwise(borders) if a < b]
+        others = [self._pool.submit(function, *part, *arguments) for part in parts[1:]]
+        for part in parts[:1]:
+            function(*part, *arguments)
+        for other in others:
+            other.result()
 
     @property
     def _still_handle(self) -> int:

@@ -202,6 +202,10 @@ class PortableEngine:
                 self._follow(batch, tables, camera, scattering)
             batch.add()
 
+    def spread(self, function: Callable[..., None], rows: int, *arguments: object) -> None:
+        """Call a function of the first row and the one after of each part of `rows`: of one part here."""
+        function(0, rows, *arguments)
+
     def _follow(self, batch: Batch, tables: Tables, camera: FloatArray, scattering: Scattering) -> None:
         """Follow the paths of a batch to their ends (see `path_kernels.film_paths`)."""
         batch.start_paths()

@@ -112,8 +112,15 @@ def shade_flat(tables: Tables, hits: NDArray[np.int32], scratch: FloatArray) -> 
     if same:
         _paint_plain(tables, first, scratch)
         return
+    # Without branches: at an edge, which lanes miss is anybody's guess.
+    red, green, blue = tables.background[0], tables.background[1], tables.background[2]
     for i in range(LANES):
-        _paint_lane(tables, hits[i], scratch, i)
+        seen = hits[i] >= 0
+        owner = tables.owners[hits[i] if seen else 0]
+        r, g, b = tables.objects[owner, COLOR], tables.objects[owner, COLOR + 1], tables.objects[owner, COLOR + 2]
+        scratch[RED + i] = r if seen else red
+        scratch[GREEN + i] = g if seen else green
+        scratch[BLUE + i] = b if seen else blue
 
 
 @njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)

@@ -6,7 +6,7 @@ and what traces them an engine's: `packets`, or `portable` on platforms without 
 
 import os
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from types import TracebackType
 from typing import Protocol, Self
 
@@ -17,7 +17,7 @@ from aliasbench.renderers.frame import Frame
 from aliasbench.renderers.geometry import build_bodies
 from aliasbench.renderers.raytrace.allocation import error_exponent
 from aliasbench.renderers.raytrace.bodies import BODY_SIZE, body_values
-from aliasbench.renderers.raytrace.development import Development, Progress, is_plain, make_optics
+from aliasbench.renderers.raytrace.development import Development, Progress, Room, is_plain, make_optics
 from aliasbench.renderers.raytrace.exposure import Exposure, plan_exposure
 from aliasbench.renderers.raytrace.film import Film
 from aliasbench.renderers.raytrace.lighting import is_scattered, light_values, put_materials, with_lights
@@ -76,6 +76,10 @@ class Engine(Protocol):
         film: Film,
     ) -> None:
         """Add samples to a film; `scattering` where paths of light are needed."""
+        ...
+
+    def spread(self, function: Callable[..., None], rows: int, *arguments: object) -> None:
+        """Call a function of the first row and the one after of each part of `rows`, on every thread."""
         ...
 
     def close(self) -> None:
@@ -144,6 +148,7 @@ class PreparedRaytrace:
         "_moving",
         "_optics",
         "_placed",
+        "_room",
         "_scene",
         "_setup_seconds",
         "_size",
@@ -167,6 +172,7 @@ class PreparedRaytrace:
         self._mesh_key: tuple[int, ...] = ()
         self._still = self._moving = build_ownership((), placed=False)
         self._optics = make_optics(technique)
+        self._room = Room()
         self._is_plain = is_plain(technique) and scene.camera.lens_radius == 0.0 and not self._is_scattered
         exposure = plan_exposure(scene, technique, size, self._bodies, 0)
         meshes = [body_mesh(body, self._looks) for body in exposure.moving]
@@ -232,7 +238,7 @@ class PreparedRaytrace:
             self._engine.expose(camera, pattern, tables, has_times, scattering, film)
 
         exponent = error_exponent(scene, t, pattern.sampler)
-        return Development(t, self._size, pattern, self._optics, expose, exponent, progress).run()
+        return Development(t, self._size, pattern, self._optics, expose, self._engine.spread, exponent, self._room, progress).run()
 
     def close(self) -> None:
         """Free what the engine holds (again is harmless)."""

@@ -46,16 +46,16 @@ REQUIRED: Mapping[tuple[str, str], Sequence[float]] = {
 
 # Curves of error against time: a technique for every value of what it has in braces.
 _COUNTS = (1, 4, 16, 64, 256)
-_TOLERANCES = (0.16, 0.12, 0.09, 0.07, 0.055, 0.045, 0.035)
+_TOLERANCES = (0.06, 0.04, 0.03, 0.024, 0.02, 0.016, 0.012)
 OURS: Mapping[str, tuple[str, Sequence[float]]] = {
     "jittered": ("raytrace:spp={},sampler=jittered,robust=off", _COUNTS),
     "multijittered": ("raytrace:spp={},sampler=multijittered,robust=off", _COUNTS),
     "sobol": ("raytrace:spp={},sampler=sobol,robust=off", _COUNTS),
     "unbiased": (
-        "raytrace:adaptive=unbiased,sampler=sobol,min_spp=8,max_spp=256,tolerance={},robust=off",
+        "raytrace:adaptive=unbiased,sampler=sobol,min_spp=4,max_spp=256,tolerance={},robust=off",
         _TOLERANCES,
     ),
-    "pooled": ("raytrace:adaptive=pooled,sampler=sobol,min_spp=16,max_spp=256,tolerance={},robust=off", _TOLERANCES),
+    "pooled": ("raytrace:adaptive=pooled,sampler=sobol,min_spp=8,max_spp=256,tolerance={},robust=off", _TOLERANCES),
 }
 
 
