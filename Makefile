@@ -21,7 +21,9 @@ lint: setup
 types: setup
 	$(BIN)/mypy
 
+# The extra `peers` is what the tracer is measured against.
 bench: setup
+	PIP_CONSTRAINT=constraints.txt $(BIN)/python -m pip install -q -e ".[dev,peers]"
 	$(BIN)/python -m pytest tests/perf --benchmark-enable --benchmark-only -s
 
 clean:

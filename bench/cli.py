@@ -138,8 +138,10 @@ def _render(options: argparse.Namespace) -> int:
     check_output(options.output)
     technique = catalog.resolve_technique(options.technique)
     scene = load_scene(options.scene)
-    with waiting(f"{scene.name} by {technique.text}"):
-        frame = catalog.render(scene, technique, size=options.size, frame=options.frame, seed=options.seed)
+    with waiting(f"{scene.name} by {technique.text}", _tell) as progress:
+        frame = catalog.render(
+            scene, technique, size=options.size, frame=options.frame, seed=options.seed, progress=progress
+        )
     write_image(options.output, frame.pixels)
     facts = {
         "scene": scene.name,

@@ -7,6 +7,7 @@ a result.
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from time import monotonic
 from typing import TYPE_CHECKING
 
 from aliasbench.bench.wording import printable
@@ -15,19 +16,30 @@ if TYPE_CHECKING:
     from aliasbench.bench.run import Step
 
 
+SILENCE_S = 10.0  # between two lines about one picture
+
+
 @contextmanager
-def waiting(what: str) -> Iterator[None]:
-    """Show on a terminal what goes on, and for how long."""
+def waiting(what: str, tell: Callable[[str], None]) -> Iterator[Callable[[float], None]]:
+    """Yield a listener to the share that is done: a spinner on a terminal, elsewhere a line by `tell` now and then."""
     if not sys.stderr.isatty():
-        yield
+        said_at = monotonic()
+
+        def say(share: float) -> None:
+            nonlocal said_at
+            if share < 1.0 and monotonic() - said_at >= SILENCE_S:
+                said_at = monotonic()
+                tell(printable(f"{what}: {share:.0%}"))
+
+        yield say
         return
     from rich.console import Console
     from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
     columns = (SpinnerColumn(), TimeElapsedColumn(), TextColumn("{task.description}", markup=False))
     with Progress(*columns, console=Console(stderr=True), transient=True) as spinner:
-        spinner.add_task(printable(what), total=None)
-        yield
+        task = spinner.add_task(printable(what), total=None)
+        yield lambda share: spinner.update(task, description=printable(f"{what}: {share:.0%}"))
 
 
 @contextmanager

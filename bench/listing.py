@@ -24,13 +24,9 @@ def _techniques() -> Rows:
 
 
 def _samplers() -> Rows:
-    from aliasbench.renderers.sampling.patterns import SAMPLERS
-    from aliasbench.renderers.technique import SAMPLER_NAMES
+    from aliasbench.renderers.technique import SAMPLER_SUMMARIES
 
-    return [
-        {"name": name, "summary": "" if name in SAMPLERS else "not available yet", "available": name in SAMPLERS}
-        for name in SAMPLER_NAMES
-    ]
+    return [{"name": name, "summary": summary} for name, summary in SAMPLER_SUMMARIES.items()]
 
 
 def _filters() -> Rows:

@@ -8,7 +8,7 @@ from numbers import Integral
 from types import TracebackType
 from typing import Self
 
-from aliasbench.renderers.frame import Frame, Prepared
+from aliasbench.renderers.frame import Frame, Prepared, Progress
 from aliasbench.renderers.technique import Technique, parse_technique
 from aliasbench.scenes.errors import InputError
 from aliasbench.scenes.model import Scene
@@ -21,6 +21,10 @@ TECHNIQUES: Mapping[str, str] = {
     "raytrace-jittered-64": "raytrace:spp=64,sampler=jittered",
     "raytrace-random-16": "raytrace:spp=16,sampler=random",
     "raytrace-grid-16": "raytrace:spp=16,sampler=grid",
+    "raytrace-sobol-16": "raytrace:spp=16,sampler=sobol",
+    "raytrace-bluenoise-4": "raytrace:spp=4,sampler=bluenoise",
+    "raytrace-gaussian-16": "raytrace:spp=16,sampler=sobol,filter=gaussian",
+    "raytrace-adaptive": "raytrace:adaptive=unbiased,sampler=sobol,tolerance=0.02,min_spp=4,max_spp=256",
     "raster-1": "raster:",
     "raster-msaa-4": "raster:msaa=4",
     "raster-passes-4": "raster:passes=4,sampler=jittered",
@@ -40,8 +44,10 @@ class CheckedScene:
     def __init__(self, inner: Prepared) -> None:
         self._inner: Prepared | None = inner
 
-    def render(self, frame: int = 0, seed: int = 0) -> Frame:
+    def render(self, frame: int = 0, seed: int = 0, progress: Progress | None = None) -> Frame:
         """Return frame number `frame` under `seed`, both whole numbers from 0 to 2^53.
+
+        `progress`, where given, is told the share of the picture that is done, from 0 to 1, now and then.
 
         Raises
         ------
@@ -55,7 +61,7 @@ class CheckedScene:
         for name, value in (("frame", frame), ("seed", seed)):
             if isinstance(value, bool) or not isinstance(value, Integral) or not 0 <= value <= MAX_NUMBER:
                 raise InputError(f"{name}={value!s:.60}: must be a whole number from 0 to 2^53")
-        return self._inner.render(frame=int(frame), seed=int(seed))
+        return self._inner.render(frame=int(frame), seed=int(seed), progress=progress)
 
     def __enter__(self) -> Self:
         return self
@@ -124,7 +130,15 @@ def _prepare(scene: Scene, chosen: Technique, size: tuple[int, int]) -> Prepared
     return prepare_reference(scene, chosen, size)
 
 
-def render(scene: Scene, technique: str | Technique, *, size: tuple[int, int], frame: int = 0, seed: int = 0) -> Frame:
+def render(
+    scene: Scene,
+    technique: str | Technique,
+    *,
+    size: tuple[int, int],
+    frame: int = 0,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> Frame:
     """Return one frame: `prepare` and `Prepared.render` at once."""
     with prepare(scene, technique, size=size) as prepared:
-        return prepared.render(frame=frame, seed=seed)
+        return prepared.render(frame=frame, seed=seed, progress=progress)

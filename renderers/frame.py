@@ -1,5 +1,6 @@
 """What a renderer returns and what holds a scene ready to be rendered: the contract shared by all renderers."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from types import TracebackType
 from typing import Literal, Protocol, Self
@@ -39,11 +40,17 @@ class Frame:
     uncertainty_kind: Literal["bound", "confidence"] | None = None
 
 
+Progress = Callable[[float], None]
+
+
 class Prepared(Protocol):
     """A scene built and uploaded for one technique and size; a context manager that frees what it holds."""
 
-    def render(self, frame: int = 0, seed: int = 0) -> Frame:
-        """Return frame number `frame`; the same arguments give the same pixels on any number of threads."""
+    def render(self, frame: int = 0, seed: int = 0, progress: Progress | None = None) -> Frame:
+        """Return frame number `frame`; the same arguments give the same pixels on any number of threads.
+
+        `progress`, where given, is told the share of the picture that is done, from 0 to 1, now and then.
+        """
         ...
 
     def __enter__(self) -> Self: ...

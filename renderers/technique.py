@@ -15,7 +15,16 @@ from aliasbench.scenes.errors import InputError, unknown_name
 RendererName = Literal["raytrace", "raster", "reference"]
 RENDERERS: tuple[RendererName, ...] = ("raytrace", "raster", "reference")
 
-SAMPLER_NAMES = ("center", "grid", "random", "jittered", "multijittered", "sobol", "bluenoise")
+SAMPLER_SUMMARIES: Mapping[str, str] = {
+    "center": "all samples in the middle of the pixel",
+    "grid": "the centres of equal cells",
+    "random": "independent points",
+    "jittered": "one point in each cell",
+    "multijittered": "jittered in cells, and in finer rows and columns as well",
+    "sobol": "Owen-scrambled Sobol points: any number of them is well spread",
+    "bluenoise": "Sobol points arranged so that neighbours' errors cancel under a small blur",
+}
+SAMPLER_NAMES = tuple(SAMPLER_SUMMARIES)
 FILTER_RADII: Mapping[str, float] = {
     "box": 0.5,
     "tent": 1.0,

@@ -15,7 +15,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from aliasbench.renderers.frame import Frame
+from aliasbench.renderers.frame import Frame, Progress
 from aliasbench.renderers.geometry import build_bodies
 from aliasbench.renderers.raster.context import acquire_context, check_samples
 from aliasbench.renderers.raster.graphics import GraphicsContext
@@ -127,8 +127,8 @@ class RasterScene:
         self._forgotten.atexit = False
         self._setup_seconds = perf_counter() - start
 
-    def render(self, frame: int = 0, seed: int = 0) -> Frame:
-        """Return frame number `frame`.
+    def render(self, frame: int = 0, seed: int = 0, progress: Progress | None = None) -> Frame:
+        """Return frame number `frame`; `progress`, where given, is told the share of its passes that are done.
 
         Raises
         ------
@@ -148,10 +148,12 @@ class RasterScene:
             # asked inside, since another thread may close it meanwhile
             if not self._forgotten.alive:
                 raise RuntimeError("this prepared scene is closed; prepare it again to render")
-            for x, y, time, *_ in passes:
+            for number, (x, y, time, *_) in enumerate(passes):
                 self._draw_pass(frame, 0.5 if t.time == "center" else time, (x - 0.5, y - 0.5), pixels)
                 if total is not None:
                     np.add(total, pixels, out=total)
+                if progress is not None:
+                    progress((number + 1) / t.passes)
             self._context.check("drawing a frame")
         if total is not None:
             np.multiply(total, 1.0 / t.passes, out=pixels, casting="same_kind")

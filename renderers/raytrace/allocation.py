@@ -63,7 +63,7 @@ def wanted_number(variance: float, tolerance: float, exponent: float, least: int
 def next_numbers(
     own: FloatArray, numbers: CountArray, tolerance: float, exponent: float, most: int, out: CountArray
 ) -> bool:
-    """Write how many samples each pixel should have next, given variances of those it has; return whether any wants more.
+    """Write how many samples each pixel should have next, given variances of its own; return whether any wants more.
 
     No pixel grows to more than eight times its samples at once: few samples tell little of their variance.
     """

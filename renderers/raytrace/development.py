@@ -4,8 +4,8 @@ Adaptive sampling (the lecture's: start small, look at the variance, go on to a 
 looks at a pixel's own samples and goes on while their standard error is too large: efficient and biased, because a
 pixel whose first samples happen to agree stops with them. `unbiased` never lets the number of a pixel's samples depend
 on those samples: it comes from the pilots of the eight neighbours, which see the same edges (`allocation`), and each
-pixel keeps its own pilot. Where neighbours' samples depend on each other (`pattern=shared`, `sampler=bluenoise`) a pilot of its own
-decides instead, and is discarded.
+pixel keeps its own pilot. Where neighbours' samples depend on each other (`pattern=shared`, `sampler=bluenoise`) a
+pilot of its own decides as well, and all pilots are discarded.
 
 Under wide filters every sample carries 1 / n of its own pixel, so that no pixel counts more for having more samples:
 each pixel's part of a filter integral is estimated by itself. Samples are taken again there once their number is known,
@@ -19,7 +19,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from aliasbench.renderers.raytrace.allocation import CountArray, neighbour_numbers, next_numbers, resolve_sums, variances
+from aliasbench.renderers.frame import Progress
+from aliasbench.renderers.raytrace.allocation import (
+    CountArray,
+    neighbour_numbers,
+    next_numbers,
+    resolve_sums,
+    variances,
+)
 from aliasbench.renderers.raytrace.film import Film, develop_rows
 from aliasbench.renderers.raytrace.profiles import profile_polynomials
 from aliasbench.renderers.sampling.filters import FilterSpec, filter_of
@@ -32,7 +39,6 @@ from aliasbench.scenes.model import FloatArray
 
 Expose = Callable[[Pattern, Film], None]
 Spread = Callable[..., None]
-Progress = Callable[[float], None]
 
 _GROUP_BYTES = 64 << 20
 _MOST_BYTES = 2 << 30
@@ -156,7 +162,7 @@ class Development:
             after = min(first + group, height + margin)
             if counts is None:
                 shape = (after - first, width + 2 * margin)
-                numbers, film = np.full(shape, self.pattern.count, np.int32), None
+                numbers, film = np.full(shape, self.pattern.samples, np.int32), None
                 passes = [(np.zeros(shape, np.int32), numbers)]
             else:
                 film, numbers, passes = self._adapt(first, after)

@@ -121,7 +121,7 @@ def run_address(pattern: Pattern, film: Film, keys: KeyArray, r: int, run: IntAr
     k, index = run[RUN_PIXEL], run[RUN_INDEX]
     key = keys[PIXEL, k]
     if not pattern.progressive or pattern.sampler == RANDOM or pattern.sampler >= SOBOL:
-        return key, pattern.count, index
+        return key, pattern.samples, index
     begin = np.int64(film.begins[r, k])
     if begin > 0:
         key = combine(key, BATCH + begin)
@@ -135,7 +135,7 @@ def place_runs(
 ) -> None:  # fmt: skip
     """Write the image positions of a packet's samples, and the signs of their weights."""
     row = film.row + r
-    if count > 1 and pattern.sampler == SOBOL and pattern.count <= SHORT:
+    if count > 1 and pattern.sampler == SOBOL and pattern.samples <= SHORT:
         fill_mixed(pattern, keys, runs, count, scratch)
         runs_to_fill = 0
     else:
@@ -144,7 +144,7 @@ def place_runs(
         run = runs[n]
         k, lane, length = run[RUN_PIXEL], run[RUN_LANE], run[RUN_LANES]
         key, size, index = run_address(pattern, film, keys, r, run)
-        if size == pattern.count and key == keys[PIXEL, k]:
+        if size == pattern.samples and key == keys[PIXEL, k]:
             if length == LANES:
                 fill_run(pattern, keys, k, index, 0, LANES, 0.0, 0.0, orders, scratch)
             else:
@@ -320,7 +320,7 @@ def _splat_pixel(film: Film, r: int, k: int, taps: FloatArray) -> None:
 
 @njit(nogil=True, cache=True, error_model="numpy", _nrt=False)
 def develop_rows(splats: FloatArray, first: int, window: FloatArray, top: int) -> None:
-    """Add rows of splats, of which the first is image row `first`, to a window (rows, width, 4) that starts at `top`."""
+    """Add rows of splats, the first that of image row `first`, to a window (rows, width, 4) that starts at `top`."""
     margin = splats.shape[1] // 2
     for r in range(splats.shape[0]):
         for j in range(splats.shape[1]):

@@ -33,7 +33,6 @@ from aliasbench.renderers.raytrace.lanes import (
 )
 from aliasbench.renderers.raytrace.pixel_sums import add_samples
 from aliasbench.renderers.raytrace.positions import KeyArray, fill_columns, fill_keys, fill_positions, fill_times
-from aliasbench.renderers.raytrace.shading import MISS, Tables, shade_flat, shade_textured
 from aliasbench.renderers.raytrace.ray_order import (
     PACKETS,
     SAMPLES,
@@ -44,6 +43,7 @@ from aliasbench.renderers.raytrace.ray_order import (
     sort_block,
     take_sorted,
 )
+from aliasbench.renderers.raytrace.shading import MISS, Tables, shade_flat, shade_textured
 from aliasbench.renderers.sampling.patterns import Pattern
 from aliasbench.scenes.model import FloatArray
 
@@ -77,7 +77,8 @@ class Workspace(NamedTuple):
 
     `hits` is the row of `ray` where Embree writes triangles.
 
-    `orders`, `numbers`, `runs`, `parts` (runs of each packet), `cursor`, `weights`, `taps` and `room` are what `positions` and `film` ask for.
+    `orders`, `numbers`, `runs`, `parts` (runs of each packet), `cursor`, `weights`, `taps` and `room` are what
+    `positions` and `film` ask for.
     """
 
     scratch: FloatArray
@@ -170,14 +171,14 @@ def render_static_flat(
         if row >= out.shape[0]:
             return
         fill_keys(pattern, 0, row, work.keys)
-        samples = out.shape[1] * pattern.count
+        samples = out.shape[1] * pattern.samples
         for first in range(0, samples, LANES):
             lanes = min(LANES, samples - first)
             fill_positions(pattern, work.keys, row, first, lanes, work.orders, work.scratch)
             fill_changing_rays(camera, work.scratch, work.ray)
             trace(scene, work, lanes)
             shade_flat(tables, work.hits, work.scratch)
-            add_samples(pattern.count, row, first, lanes, work.scratch, work.sums, out)
+            add_samples(pattern.samples, row, first, lanes, work.scratch, work.sums, out)
 
 
 @njit(nogil=True, cache=True, error_model="numpy", _nrt=False)
@@ -193,14 +194,14 @@ def render_static_textured(
         if row >= out.shape[0]:
             return
         fill_keys(pattern, 0, row, work.keys)
-        samples = out.shape[1] * pattern.count
+        samples = out.shape[1] * pattern.samples
         for first in range(0, samples, LANES):
             lanes = min(LANES, samples - first)
             fill_positions(pattern, work.keys, row, first, lanes, work.orders, work.scratch)
             fill_changing_rays(camera, work.scratch, work.ray)
             trace(scene, work, lanes)
             shade_textured(tables, camera, work.hits, work.scratch)
-            add_samples(pattern.count, row, first, lanes, work.scratch, work.sums, out)
+            add_samples(pattern.samples, row, first, lanes, work.scratch, work.sums, out)
 
 
 @njit(nogil=True, cache=True, error_model="numpy", _nrt=False)
@@ -216,7 +217,7 @@ def render_moving(
         if row >= out.shape[0]:
             return
         fill_keys(pattern, 0, row, work.keys)
-        samples = out.shape[1] * pattern.count
+        samples = out.shape[1] * pattern.samples
         for start in range(0, samples, SAMPLES):
             count = min(SAMPLES, samples - start)
             packets = (count + LANES - 1) // LANES
@@ -230,7 +231,7 @@ def render_moving(
             for p in range(packets):
                 restore_packet(work.block, p, work.scratch)
                 lanes = min(LANES, count - p * LANES)
-                add_samples(pattern.count, row, start + p * LANES, lanes, work.scratch, work.sums, out)
+                add_samples(pattern.samples, row, start + p * LANES, lanes, work.scratch, work.sums, out)
 
 
 @njit(nogil=True, cache=True, error_model="numpy", _nrt=False)

@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from aliasbench.renderers.frame import Progress
 from aliasbench.renderers.raytrace.embree import Device, TriangleScene
 from aliasbench.renderers.raytrace.film import Film
 from aliasbench.renderers.raytrace.kernels import (
@@ -30,15 +31,14 @@ from aliasbench.renderers.raytrace.lanes import (
 )
 from aliasbench.renderers.raytrace.paths import Scattering, make_paths
 from aliasbench.renderers.raytrace.positions import KEY_ROWS, orders_size
+from aliasbench.renderers.raytrace.ray_order import PACKETS, make_block
 from aliasbench.renderers.raytrace.shading import Tables
 from aliasbench.renderers.raytrace.tables import Mesh
 from aliasbench.renderers.raytrace.texturing import CUTOFF
-from aliasbench.renderers.raytrace.ray_order import PACKETS, make_block
 from aliasbench.renderers.sampling.patterns import Pattern
 from aliasbench.scenes.model import FloatArray
 
 Kernel = Callable[..., None]
-Progress = Callable[[float], None]
 
 _COHERENT = 1 << 16
 _ALL_FEATURES = -1
@@ -124,11 +124,11 @@ class PacketEngine:
         progress: Progress | None = None,
     ) -> None:
         """Write the picture (h, w, 3), every sample counting in its own pixel alone."""
+        handles: tuple[object, ...] = (self._still_handle,)
         if moving:
             kernel, handles = render_moving, (self._still_handle, self._handles)
         else:
-            textured = len(tables.triangles) > 0
-            kernel, handles = render_static_textured if textured else render_static_flat, (self._still_handle,)
+            kernel = render_static_textured if len(tables.triangles) > 0 else render_static_flat
         self._run(kernel, (*handles, camera, pattern, tables), out.shape[1], 0, out, progress)
 
     def expose(

@@ -1,4 +1,4 @@
-"""The kernel of scattered light: `paths` step by step, with Embree between the steps. Only scenes that need it load it."""
+"""The kernel of scattered light: `paths` step by step, with Embree between the steps. Only scenes with it load this."""
 
 import numpy as np
 from numba import njit, types
@@ -121,10 +121,10 @@ def film_paths(
                 if any_lit:
                     if has_lights:
                         for k in range(scattering.shadow_rays):
+                            own = work.runs[0]
                             draw_lights(
-                                pattern, film, work.keys, r, work.runs[0], runs, scattering.shadow_rays, k, work.numbers,
-                                paths,
-                            )  # fmt: skip
+                                pattern, film, work.keys, r, own, runs, scattering.shadow_rays, k, work.numbers, paths
+                            )
                             if aim_at_lights(
                                 tables, segment, k, share, paths, work.scratch, shadow.scratch, shadow.ray, shadow.valid
                             ):

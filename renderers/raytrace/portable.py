@@ -16,6 +16,7 @@ from embreex.rtcore_scene import EmbreeScene
 from numba import njit
 from numpy.typing import NDArray
 
+from aliasbench.renderers.frame import Progress
 from aliasbench.renderers.raytrace.bodies import fill_body_rays, to_body
 from aliasbench.renderers.raytrace.cutouts import find_holes
 from aliasbench.renderers.raytrace.film import Film
@@ -94,7 +95,7 @@ class _Body:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Search:
-    """The nearest hits so far: distances and triangles (n,) of all lanes of `scratch`; none beyond the first distances."""
+    """The nearest hits so far, none beyond the first distances: distances and triangles (n,) of lanes of `scratch`."""
 
     tables: Tables
     camera: FloatArray
@@ -162,11 +163,11 @@ class PortableEngine:
         tables: Tables,
         moving: bool,
         out: RayArray,
-        progress: Callable[[float], None] | None = None,
+        progress: Progress | None = None,
     ) -> None:
         """Write the picture (h, w, 3), every sample counting in its own pixel alone."""
         self._check_open()
-        per_row = -(-out.shape[1] * pattern.count // LANES)
+        per_row = -(-out.shape[1] * pattern.samples // LANES)
         rows = max(1, _BATCH // per_row)
         scratch = np.zeros((rows * per_row, SCRATCH_SIZE))
         rays = np.zeros((rows * per_row, RAY_SIZE), np.float32)
@@ -260,7 +261,7 @@ def _make_rays(
     camera: FloatArray, pattern: Pattern, moving: bool, top: int, keys: KeyArray, orders: NDArray[np.int32],
     numbers: NDArray[np.int64], scratch: FloatArray, rays: RayArray,
 ) -> None:  # fmt: skip
-    samples = keys.shape[1] * pattern.count
+    samples = keys.shape[1] * pattern.samples
     per_row = (samples + LANES - 1) // LANES
     for block in range(len(scratch)):
         row, first = top + block // per_row, block % per_row * LANES
@@ -288,7 +289,7 @@ def _shade(
     sums: FloatArray, out: RayArray,
 ) -> None:  # fmt: skip
     textured = len(tables.triangles) > 0
-    samples = out.shape[1] * pattern.count
+    samples = out.shape[1] * pattern.samples
     per_row = (samples + LANES - 1) // LANES
     for block in range(len(scratch)):
         if textured:
@@ -296,4 +297,4 @@ def _shade(
         else:
             shade_flat(tables, hits[block], scratch[block])
         row, first = top + block // per_row, block % per_row * LANES
-        add_samples(pattern.count, row, first, min(LANES, samples - first), scratch[block], sums, out)
+        add_samples(pattern.samples, row, first, min(LANES, samples - first), scratch[block], sums, out)

@@ -62,7 +62,8 @@ class FilmRoom:
         self.scratch, self.rays = np.zeros((packets, SCRATCH_SIZE)), np.zeros((packets, RAY_SIZE), np.float32)
         self.runs, self.heads = np.zeros((packets, LANES, 4), np.int64), np.zeros((packets, 3), np.int64)
         taps = 2 * film.margin + 1
-        self.weights, self.taps, self.room = np.zeros((taps, 2 * LANES)), np.zeros((taps, taps, 4)), np.zeros((4, 2 * LANES))
+        self.weights, self.taps = np.zeros((taps, 2 * LANES)), np.zeros((taps, taps, 4))
+        self.room = np.zeros((4, 2 * LANES))
         fill_columns(pattern, film.column, self.keys)
 
     def next_batch(self) -> "Batch | None":
@@ -82,7 +83,9 @@ class Batch:
         self.scratch, self.rays = room.scratch[:count], room.rays[:count]
         self.runs, self.heads = room.runs[:count], room.heads[:count]
         self.hits = np.full((count, LANES), MISS, np.int32)
-        self.shadow = self.shadow_rays = self.valid = np.zeros(0)
+        self.shadow = np.zeros((0, SCRATCH_SIZE))
+        self.shadow_rays = np.zeros((0, RAY_SIZE), np.float32)
+        self.valid = np.zeros((0, LANES), np.int32)
         self.paths = Paths(np.zeros(0), np.zeros(0, np.int32), np.zeros(0, np.uint64), np.zeros(0, np.int64))
 
     def ends(self) -> RayArray:

@@ -71,17 +71,17 @@ def fill_keys(pattern: Pattern, first_column: int, row: int, keys: KeyArray) -> 
 
 def orders_size(pattern: Pattern) -> int:
     """Return how many columns the array of `_fill_orders` needs."""
-    return max(row_count(pattern.count), pattern.count // row_count(pattern.count) + 1)
+    return max(row_count(pattern.samples), pattern.samples // row_count(pattern.samples) + 1)
 
 
 @njit(cache=True, error_model="numpy", _nrt=False)
 def _fill_orders(pattern: Pattern, first: int, second: int, orders: NDArray[np.int32]) -> None:
     """Write one pixel's orders of multijittered rows, and of columns in rows of the two lengths."""
-    rows = row_count(pattern.count)
-    shortest = pattern.count // rows
+    rows = row_count(pattern.samples)
+    shortest = pattern.samples // rows
     for k in range(rows):
         orders[0, k] = row_order(k, rows, first)
-    for longer in range(2 if shortest * rows < pattern.count else 1):
+    for longer in range(2 if shortest * rows < pattern.samples else 1):
         for k in range(shortest + longer):
             orders[1 + longer, k] = column_order(k, shortest + longer, second)
 
@@ -126,8 +126,8 @@ def fill_run(
     if sampler == MULTIJITTERED:
         if index == 0:
             _fill_orders(pattern, first, second, orders)
-        rows = row_count(pattern.count)
-        shortest = pattern.count // rows
+        rows = row_count(pattern.samples)
+        shortest = pattern.samples // rows
         for k in range(run):
             i = (index + k) & INDEX_MASK
             column, longer = pattern.places[1, i], pattern.places[2, i]
@@ -145,9 +145,7 @@ def fill_run(
 
 
 @njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
-def fill_mixed(
-    pattern: Pattern, keys: KeyArray, runs: NDArray[np.int64], count: int, scratch: FloatArray
-) -> None:
+def fill_mixed(pattern: Pattern, keys: KeyArray, runs: NDArray[np.int64], count: int, scratch: FloatArray) -> None:
     """Write places in their pixels of several pixels' samples at once, of Sobol's sequence up to number SHORT.
 
     `runs` (count, 4) are rows of pixel, sample, first lane and lanes (`film`).
@@ -171,15 +169,15 @@ def fill_positions(
     pattern: Pattern, keys: KeyArray, row: int, first: int, lanes: int, orders: NDArray[np.int32], scratch: FloatArray
 ) -> None:
     """Write the image positions of `lanes` samples of a row from its sample number `first` on."""
-    column = first // pattern.count
-    index = (first - column * pattern.count) & INDEX_MASK
-    if pattern.count - index >= LANES:
+    column = first // pattern.samples
+    index = (first - column * pattern.samples) & INDEX_MASK
+    if pattern.samples - index >= LANES:
         # A loop of constant length is what the compiler vectorises best, and this is the common case.
         fill_run(pattern, keys, column, index, 0, LANES, float(column), float(row), orders, scratch)
         return
     lane = 0
     while lane < lanes:
-        run = min(lanes - lane, pattern.count - index)
+        run = min(lanes - lane, pattern.samples - index)
         fill_run(pattern, keys, column, index, lane, run, float(column), float(row), orders, scratch)
         lane += run
         column, index = column + 1, 0
@@ -295,7 +293,7 @@ def fill_times(
     pattern: Pattern, keys: KeyArray, row: int, first: int, lanes: int, numbers: NDArray[np.int64], scratch: FloatArray
 ) -> None:
     """Write the shutter positions of `lanes` samples of a row from its sample number `first` on."""
-    count = pattern.count
+    count = pattern.samples
     column, index = first // count, first % count
     lane = 0
     while lane < lanes:

@@ -152,9 +152,7 @@ def weigh_lanes(
 
 
 @njit(cache=True, error_model="numpy", fastmath={"reassoc"}, _nrt=False)
-def add_taps(
-    margin: int, weights: FloatArray, colors: FloatArray, at: int, taps: FloatArray, room: FloatArray
-) -> None:
+def add_taps(margin: int, weights: FloatArray, colors: FloatArray, at: int, taps: FloatArray, room: FloatArray) -> None:
     """Add 16 samples of one pixel to its taps (2 margin + 1, 2 margin + 1, 4): weighted colours, and weights.
 
     `weights` as from `weigh_lanes`; `colors` holds red, green and blue from `at` on; `room` is (4, 2 LANES).

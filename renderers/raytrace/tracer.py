@@ -13,11 +13,11 @@ from typing import Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from aliasbench.renderers.frame import Frame
+from aliasbench.renderers.frame import Frame, Progress
 from aliasbench.renderers.geometry import build_bodies
 from aliasbench.renderers.raytrace.allocation import error_exponent
 from aliasbench.renderers.raytrace.bodies import BODY_SIZE, body_values
-from aliasbench.renderers.raytrace.development import Development, Progress, Room, is_plain, make_optics
+from aliasbench.renderers.raytrace.development import Development, Room, is_plain, make_optics
 from aliasbench.renderers.raytrace.exposure import Exposure, plan_exposure
 from aliasbench.renderers.raytrace.film import Film
 from aliasbench.renderers.raytrace.lighting import is_scattered, light_values, put_materials, with_lights
@@ -238,7 +238,9 @@ class PreparedRaytrace:
             self._engine.expose(camera, pattern, tables, has_times, scattering, film)
 
         exponent = error_exponent(scene, t, pattern.sampler)
-        return Development(t, self._size, pattern, self._optics, expose, self._engine.spread, exponent, self._room, progress).run()
+        return Development(
+            t, self._size, pattern, self._optics, expose, self._engine.spread, exponent, self._room, progress
+        ).run()
 
     def close(self) -> None:
         """Free what the engine holds (again is harmless)."""

@@ -19,7 +19,7 @@ from typing import Self
 
 import numpy as np
 
-from aliasbench.renderers.frame import Frame
+from aliasbench.renderers.frame import Frame, Progress
 from aliasbench.renderers.reference.averaged import average
 from aliasbench.renderers.reference.cache import Stored, fetch
 from aliasbench.renderers.reference.constant_uv import paint_constant
@@ -57,8 +57,13 @@ class PreparedReference:
     paths: Paths
     setup_seconds: float
 
-    def render(self, frame: int = 0, seed: int = 0) -> Frame:  # noqa: ARG002 - the contract's; a reference has no seed
-        """Return the reference of frame number `frame`."""
+    def render(
+        self,
+        frame: int = 0,
+        seed: int = 0,  # noqa: ARG002 - the contract's; a reference has no seed
+        progress: Progress | None = None,
+    ) -> Frame:
+        """Return the reference of frame number `frame`; `progress` is told its end alone."""
         start = time.perf_counter()
         shown = 0 if self.scene.is_static else frame
         plain = self.drawn is not None and not (_is_textured(self.drawn) or self.scene.lights or self.shutter_open)
@@ -67,6 +72,8 @@ class PreparedReference:
         else:
             stored = fetch(self.key(shown), lambda: self._make(shown))
         self._check(stored)
+        if progress is not None:
+            progress(1.0)
         return Frame(
             pixels=stored.pixels,
             seconds=time.perf_counter() - start,
@@ -244,7 +251,7 @@ def _refuse_missing(scene: Scene) -> None:
     """Raise for what a scene has and references do not have yet."""
     if scene.bounces:
         raise UnsupportedScene(
-            f"reference: diffuse interreflection (bounces = {scene.bounces}) is not drawn; direct light is (bounces = 0)"
+            f"reference: diffuse interreflection (bounces = {scene.bounces}) is not drawn; direct light alone is"
         )
     for index, surface in enumerate(scene.objects):
         if surface.material.kind not in ("unlit", "diffuse"):

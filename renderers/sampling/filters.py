@@ -112,7 +112,9 @@ class FilterSpec:
         """The integral of abs f: 1, or more with negative lobes."""
         if self.name not in ("mitchell", "lanczos"):
             return 1.0
-        zeros = np.arange(1, math.ceil(self.radius)) if self.name == "lanczos" else np.array([self.radius * _MITCHELL_ZERO])
+        zeros = (
+            np.arange(1, math.ceil(self.radius)) if self.name == "lanczos" else np.array([self.radius * _MITCHELL_ZERO])
+        )
         steps = np.diff(self.integral(np.concatenate([-zeros[::-1], zeros, [self.radius]])), prepend=0.0)
         return float(np.abs(steps).sum()) ** 2
 

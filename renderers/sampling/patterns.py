@@ -71,7 +71,7 @@ class Pattern(NamedTuple):
 
     Attributes
     ----------
-    sampler, count : int
+    sampler, samples : int
         The sampler's number and N.
     start : uint64
         `frame_key` of seed and frame.
@@ -92,7 +92,7 @@ class Pattern(NamedTuple):
     """
 
     sampler: int
-    count: int
+    samples: int
     start: np.uint64
     shared: bool
     progressive: bool
@@ -117,7 +117,10 @@ def sampler_code(name: str) -> int:
 
 
 def make_pattern(name: str, count: int, start: int, *, shared: bool, progressive: bool = False) -> Pattern:
-    """Return the pattern of `count` samples a pixel under a sampler's name; `start` is `frame_key` of seed and frame."""
+    """Return the pattern of `count` samples a pixel under a sampler's name.
+
+    `start` is `frame_key` of seed and frame.
+    """
     code = sampler_code(name)
     cells = np.zeros((4, count))
     tables, tile = np.zeros((2, 0, 0), np.uint32), np.zeros((0, 0, WORDS), np.uint64)
@@ -335,7 +338,7 @@ def pattern_frame(reseed: str, frame: int) -> int:
 
 @njit(cache=True)
 def _fill(pattern: Pattern, column: int, row: int, out: FloatArray) -> None:
-    count = pattern.count
+    count = pattern.samples
     rows = row_count(count)
     key = pixel_key(pattern.start, column, row)
     for index in range(count):
@@ -348,7 +351,9 @@ def _fill(pattern: Pattern, column: int, row: int, out: FloatArray) -> None:
             x, y = plane_position(pattern, count, rows, index, a, b, plane_order(pattern, key, column, row, pair))
             out[index, pair], out[index, pair + 1] = x, y
         a, _ = stream_keys(pattern, key, column, row, DIM_WAVELENGTH)
-        out[index, DIM_WAVELENGTH] = line_position(pattern, count, index, a, line_order(pattern, key, column, row, DIM_WAVELENGTH))
+        out[index, DIM_WAVELENGTH] = line_position(
+            pattern, count, index, a, line_order(pattern, key, column, row, DIM_WAVELENGTH)
+        )
 
 
 def sample_set(
