@@ -40,6 +40,7 @@ schema = 1
 name = "whole"
 background = [0.0, 0.1, 0.2]
 contrast = 0.8
+bounces = 1
 [animation]
 fps = 24
 frames = 12
@@ -138,6 +139,7 @@ def test_every_key_of_the_schema_is_read(scene_file: Write) -> None:
         name="whole",
         background=(0.0, 0.1, 0.2),
         contrast=0.8,
+        bounces=1,
         animation=Animation(24.0, 12, 0.5),
         camera=Camera(
             "perspective",

@@ -79,7 +79,6 @@ def test_forgotten_scenes_are_freed_by_the_next(make):
         ("raster:post=fxaa", "post=fxaa"),
         ("raster:msaa=4,alpha_to_coverage=on", "alpha_to_coverage=on"),
         ("raster:motion=matrix", "motion=matrix"),
-        ("raster:passes=4,sampler=sobol", "sampler=sobol"),
     ],
 )
 def test_features_that_are_not_there_yet_say_what_is(make, technique, feature):
@@ -98,6 +97,7 @@ def test_materials_lights_and_lenses_that_are_not_drawn_are_named(make):
         (replace(star, lights=(light,), objects=diffuse), r"lights \(1\) are"),
         (replace(star, objects=glass), r"material glass \(object .*\) is"),
         (replace(star, camera=lens), r"a lens \(lens_radius = 0.1\) is"),
+        (replace(star, bounces=1), r"diffuse interreflection \(bounces = 1\) is"),
     ):
         with pytest.raises(UnsupportedScene, match=f"raster: {feature} not drawn; "):
             prepare(scene, "raster", size=SIZE)

@@ -8,8 +8,8 @@ import pytest
 import shapely
 
 from aliasbench.renderers.catalog import prepare, render
-from aliasbench.scenes.errors import InputError, NotAvailableError, UnsupportedScene
-from aliasbench.scenes.model import Camera, Checker, Grating, Light, Material, Motion, Scene
+from aliasbench.scenes.errors import InputError
+from aliasbench.scenes.model import Camera, Checker, Grating, Material, Motion, Scene
 
 PERSPECTIVE = Camera("perspective", position=(0.0, 0.0, 5.0), fov_y_deg=90.0)
 SLANTED = Camera("perspective", position=(3.0, 2.0, 5.0), fov_y_deg=60.0)
@@ -124,36 +124,6 @@ def test_shared_patterns_have_equal_offsets_in_every_pixel(quad: Any, flat_scene
     shared = render(scene, "raytrace:spp=5,pattern=shared", size=(16, 16)).pixels
     assert np.ptp(shared) < 1e-6
     assert np.ptp(render(scene, "raytrace:spp=5,pattern=pixel", size=(16, 16)).pixels) > 0.1
-
-
-@pytest.mark.parametrize(
-    ("technique", "message"),
-    [
-        ("raytrace:filter=tent", r"filter=tent,radius=1 is not available .* available: filter=box,radius=.5"),
-        ("raytrace:radius=1.5", r"filter=box,radius=1.5 is not available"),
-        ("raytrace:weighting=distribution", r"weighting=distribution is not available .* available: weighting=samples"),
-        ("raytrace:adaptive=pooled", r"adaptive=pooled is not available .* available: adaptive=off"),
-        ("raytrace:motion=matrix", r"motion=matrix is not available .* available: motion=exact"),
-        ("raytrace:texture=ewa", r"texture=ewa is not available .* available: texture=point, linear, mipmap"),
-        ("raytrace:spp=4,sampler=sobol", r"sampler=sobol is not available yet; available: center, grid"),
-    ],
-)
-def test_techniques_not_there_yet_are_refused(triangle_scene: Scene, technique: str, message: str) -> None:
-    with pytest.raises(NotAvailableError, match=message):
-        prepare(triangle_scene, technique, size=(4, 4))
-
-
-def test_what_a_scene_has_and_the_tracer_does_not_draw_is_named(quad: Any, flat_scene: Any) -> None:
-    lens = flat_scene([], camera=Camera("orthographic", height=4.0, lens_radius=0.5))
-    with pytest.raises(UnsupportedScene, match=r"raytrace: a lens \(lens_radius = 0.5\) is not drawn"):
-        prepare(lens, "raytrace:", size=(4, 4))
-    corners = ((0.0, 1.0, 0.0), (1.0, 1.0, 0.0), (1.0, 1.0, 1.0), (0.0, 1.0, 1.0))
-    lit = dataclasses.replace(flat_scene([]), lights=(Light(corners, (1.0, 1.0, 1.0)),))
-    with pytest.raises(UnsupportedScene, match=r"raytrace: lights \(1\) are not drawn"):
-        prepare(lit, "raytrace:", size=(4, 4))
-    glass = dataclasses.replace(quad(-1, -1, 1, 1), material=Material("glass"), name="pane")
-    with pytest.raises(UnsupportedScene, match=r"raytrace: material glass \(object pane\) is not drawn"):
-        prepare(flat_scene([glass]), "raytrace:", size=(4, 4))
 
 
 def test_diffuse_without_lights_equals_unlit(quad: Any, flat_scene: Any) -> None:

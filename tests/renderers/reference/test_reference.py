@@ -41,6 +41,12 @@ def test_materials_that_are_not_there_yet_are_named(make_polygon, make_scene, ma
         render(make_scene([shiny]), "reference:", size=(4, 4))
 
 
+def test_light_that_goes_on_from_one_surface_to_another_is_named(make_polygon, make_scene):
+    scene = replace(make_scene([make_polygon(TRIANGLE)]), bounces=1)
+    with pytest.raises(UnsupportedScene, match=r"diffuse interreflection \(bounces = 1\) is not drawn; direct light"):
+        render(scene, "reference:", size=(4, 4))
+
+
 @pytest.mark.parametrize("technique", ["reference:", "reference:filter=tent", "reference:time=center"])
 @pytest.mark.parametrize("camera", [None, LENS], ids=["pinhole", "lens"])
 @pytest.mark.parametrize("kind", ["flat", "textured", "lit"])
