@@ -12,7 +12,9 @@ def check_unlit(renderer: str, scene: Scene) -> None:
     if scene.lights:
         raise UnsupportedScene(f"{renderer}: lights ({len(scene.lights)}) are not drawn; scenes without lights are")
     if scene.bounces:
-        raise UnsupportedScene(f"{renderer}: diffuse interreflection (bounces = {scene.bounces}) is not drawn; direct light alone is")
+        raise UnsupportedScene(
+            f"{renderer}: diffuse interreflection (bounces = {scene.bounces}) is not drawn; direct light alone is"
+        )
     for index, surface in enumerate(scene.objects):
         if surface.material.kind not in ("unlit", "diffuse"):
             raise UnsupportedScene(

@@ -12,6 +12,10 @@ from aliasbench.renderers.sampling.bits import hidden
 from aliasbench.renderers.sampling.patterns import DIM_LENS, DIM_TIME, Pattern
 from aliasbench.scenes.model import FloatArray
 
+# As they stand in calls; see `patterns` on such integers.
+TIMES, ONE = np.int64(TIME), np.int64(1)
+LENS_U, LENS_V = np.int64(LENS_X), np.int64(LENS_Y)
+
 
 @njit(cache=True, error_model="numpy", _nrt=False)
 def fill_film_times(
@@ -24,7 +28,7 @@ def fill_film_times(
         key, size, index = run_address(pattern, film, keys, r, run)
         column, row = film.column + run[RUN_PIXEL], film.row + r
         fill_line(
-            pattern, size, key, column, row, DIM_TIME, index, run[RUN_LANE], run[RUN_LANES], numbers, scratch, TIME
+            pattern, size, key, column, row, DIM_TIME, index, run[RUN_LANE], run[RUN_LANES], numbers, scratch, TIMES
         )
 
 
@@ -39,8 +43,8 @@ def fill_film_lens(
         key, size, index = run_address(pattern, film, keys, r, run)
         column, row = film.column + run[RUN_PIXEL], film.row + r
         fill_plane(
-            pattern, size, key, column, row, DIM_LENS, index, 1, run[RUN_LANE], run[RUN_LANES], numbers, scratch,
-            LENS_X, LENS_Y,
+            pattern, size, key, column, row, DIM_LENS, index, ONE, run[RUN_LANE], run[RUN_LANES], numbers, scratch,
+            LENS_U, LENS_V,
         )  # fmt: skip
     for i in range(hidden(LANES)):
         x, y = disc_point(scratch[LENS_X + i], scratch[LENS_Y + i])

@@ -29,7 +29,7 @@ from aliasbench.renderers.raytrace.allocation import (
 )
 from aliasbench.renderers.raytrace.film import Film, develop_rows
 from aliasbench.renderers.raytrace.profiles import profile_polynomials
-from aliasbench.renderers.sampling.filters import FilterSpec, filter_of
+from aliasbench.renderers.sampling.filters import GAUSSIAN, FilterSpec, filter_of
 from aliasbench.renderers.sampling.hashing import combine
 from aliasbench.renderers.sampling.patterns import RANDOM, SOBOL, Pattern, make_pattern
 from aliasbench.renderers.sampling.warps import IDENTITY, Warp, make_warp
@@ -42,9 +42,12 @@ Spread = Callable[..., None]
 
 _GROUP_BYTES = 64 << 20
 _MOST_BYTES = 2 << 30
+# Beyond so many sigmas a Gaussian has 4e-9 of its mass, and weights get down to what polynomials leave of it (1e-9 of
+# the peak): they could be negative, and sums of them anything.
+_FAR_SIGMAS = 6.0
 _PILOT = 0x9110  # what the key of a discarded pilot is derived with
-# Under a filter with lobes few samples can have weights that cancel; the picture then falls back to their sum over the
-# number expected, instead of dividing by nearly nothing. From some ten samples under the filter on it never does.
+# Under a filter with lobes few samples can have weights that nearly cancel, and a quotient of them is anything; see
+# `_resolve`. Of single samples of a pixel 7 % do (lanczos), of four 0.1 %, of sixteen none.
 _LEAST_WEIGHT = 0.25
 
 
@@ -58,18 +61,30 @@ class Optics:
     profile: FloatArray
 
     @property
+    def reach(self) -> float:
+        """How far away a sample counts at most, across or up, in pixels: where weights are more than rounding."""
+        if self.spec.kind.code == GAUSSIAN:
+            return min(self.spec.radius, _FAR_SIGMAS * self.spec.sigma)
+        return self.spec.radius
+
+    @property
     def margin(self) -> int:
         """How many pixels away a sample still counts."""
-        return self.spec.margin if self.is_splat else 0
+        return max(0, math.ceil(self.reach - 0.5)) if self.is_splat else 0
 
     @property
     def spread(self) -> float:
         """The side of the square in the middle of a pixel that its samples lie in: none where no filter reaches."""
-        return min(1.0, 2.0 * self.spec.radius) if self.is_splat else 1.0
+        return min(1.0, 2.0 * self.reach) if self.is_splat else 1.0
+
+    def row_bytes(self, width: int) -> int:
+        """Return the memory of one row of film of a picture `width` pixels wide."""
+        each = 96 if not self.is_splat else 32 * (2 * self.margin + 1) + 96
+        return (width + 2 * self.margin) * each
 
 
-def make_optics(technique: Technique) -> Optics:
-    """Return what a technique's film is made with.
+def make_optics(technique: Technique, width: int) -> Optics:
+    """Return what the film of a picture `width` pixels wide is made with.
 
     Raises
     ------
@@ -80,14 +95,18 @@ def make_optics(technique: Technique) -> Optics:
     is_box = technique.filter == "box" and technique.radius_px == 0.5
     is_splat = technique.weighting == "samples" and not is_box
     optics = Optics(spec, make_warp(technique), is_splat, np.zeros((0, 0, 0)))
+    if optics.row_bytes(width) * (2 * optics.margin + 2) > _MOST_BYTES:
+        raise InputError(
+            f"radius={technique.radius_px:g}: a picture {width} pixels wide under so wide a filter needs more than "
+            f"{_MOST_BYTES >> 30} GB; a smaller radius or picture does not"
+        )
     if is_splat and spec.kind.separable:
         return replace(optics, profile=profile_polynomials(spec, optics.margin, 0.5 * optics.spread))
     return optics
 
 
-def is_plain(technique: Technique) -> bool:
+def is_plain(technique: Technique, optics: Optics) -> bool:
     """Return whether every pixel takes the same number of samples of equal weight, spread over the pixel alone."""
-    optics = make_optics(technique)
     return technique.adaptive == "off" and not optics.is_splat and optics.warp.code == IDENTITY
 
 
@@ -147,14 +166,7 @@ class Development:
         """Return the picture (h, w, 3), and the samples of each pixel (h, w) where they differ."""
         width, height = self.size
         margin = self.optics.margin
-        taps = 2 * margin + 1
-        row_bytes = (width + 2 * margin) * (96 if not self.optics.is_splat else 32 * taps + 96)
-        if row_bytes * (taps + 1) > _MOST_BYTES:
-            raise InputError(
-                f"radius={self.technique.radius_px:g}: a picture {width} pixels wide under so wide a filter needs more "
-                f"than {_MOST_BYTES >> 30} GB; a smaller radius or picture does not"
-            )
-        group = max(1, min(height + 2 * margin, _GROUP_BYTES // row_bytes))
+        group = max(1, min(height + 2 * margin, _GROUP_BYTES // self.optics.row_bytes(width)))
         out = np.zeros((height, width, 3), np.float32)
         counts = None if self.technique.adaptive == "off" else np.zeros((height, width), np.int32)
         window, top = np.zeros((0, width, 4)), 0  # image rows from `top` on that rows of samples still add to
@@ -213,7 +225,7 @@ class Development:
             np.zeros((0, 0)) if numbers is None else 1.0 / numbers,
             np.zeros((0, 0, 0, 0)) if numbers is None else self.room.zeros("splats", (rows, taps, self.size[0], 4)),
             optics.margin,
-            optics.spec.radius,
+            optics.reach,
             optics.spread,
             not optics.spec.kind.separable,
             optics.profile,
@@ -230,12 +242,25 @@ class Development:
         develop_rows(film.splats, row, window, top)
 
     def _resolve(self, window: FloatArray) -> FloatArray:
-        """Return the colours of finished rows of a window."""
+        """Return the colours of finished rows of a window.
+
+        Where weights nearly cancel it is the sum of weighted colours over the weight expected, and what is missing to
+        that weight, or too much, has the mean colour of the neighbours in the row: what is flat stays flat.
+        """
         weights = window[..., 3:]
         if self.optics.spec.gain > 1.0:
             # samples weigh 1 / n over the square that they are spread over, and the filter's integral is 1
             expected = self.optics.spread**-2
-            return window[..., :3] / np.where(weights < _LEAST_WEIGHT * expected, expected, weights)
+            weak = weights < _LEAST_WEIGHT * expected
+            out: FloatArray = window[..., :3] / np.where(weak, expected, weights)
+            if weak.any():
+                reach = 2 * self.optics.margin + 1
+                padded = np.pad(window, ((0, 0), (reach, reach), (0, 0)))
+                sums = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1, axis=1).sum(axis=-1)
+                strong = sums[..., 3:] > _LEAST_WEIGHT * expected * reach
+                means = np.divide(sums[..., :3], sums[..., 3:], out=np.zeros_like(out), where=strong)
+                out += np.where(weak, (1.0 - weights / expected) * means, 0.0)
+            return out
         return np.divide(window[..., :3], weights, out=np.zeros_like(window[..., :3]), where=weights > 0.0)
 
     def _adapt(self, first: int, after: int) -> tuple[Film, CountArray, list[tuple[CountArray, CountArray]]]:

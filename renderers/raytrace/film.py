@@ -18,7 +18,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from aliasbench.renderers.raytrace.lanes import BLUE, GREEN, LANES, PX, PY, RED, SIGN
-from aliasbench.renderers.raytrace.positions import BATCH, PIXEL, SHORT, KeyArray, fill_mixed, fill_run
+from aliasbench.renderers.raytrace.positions import ALL, BATCH, PIXEL, SHORT, START, KeyArray, fill_mixed, fill_run
 from aliasbench.renderers.raytrace.profiles import add_taps, weigh_lanes
 from aliasbench.renderers.sampling.hashing import combine
 from aliasbench.renderers.sampling.patterns import (
@@ -146,7 +146,7 @@ def place_runs(
         key, size, index = run_address(pattern, film, keys, r, run)
         if size == pattern.samples and key == keys[PIXEL, k]:
             if length == LANES:
-                fill_run(pattern, keys, k, index, 0, LANES, 0.0, 0.0, orders, scratch)
+                fill_run(pattern, keys, k, index, START, ALL, 0.0, 0.0, orders, scratch)
             else:
                 fill_run(pattern, keys, k, index, lane, length, 0.0, 0.0, orders, scratch)
         else:

@@ -127,9 +127,22 @@ def start_paths(
         key, size, index = run_address(pattern, film, keys, r, run)
         column, row, lane, length = film.column + run[RUN_PIXEL], film.row + r, run[RUN_LANE], run[RUN_LANES]
         fill_plane(
-            pattern, size, key, column, row, DIM_DIRECTION, index, 1, lane, length, numbers, rows, TURN_U, TURN_V
+            pattern,
+            size,
+            key,
+            column,
+            row,
+            DIM_DIRECTION,
+            index,
+            np.int64(1),
+            lane,
+            length,
+            numbers,
+            rows,
+            np.int64(TURN_U),
+            np.int64(TURN_V),
         )
-        fill_line(pattern, size, key, column, row, DIM_WAVELENGTH, index, lane, length, numbers, rows, WAVE)
+        fill_line(pattern, size, key, column, row, DIM_WAVELENGTH, index, lane, length, numbers, rows, np.int64(WAVE))
         for i in range(length):
             paths.keys[lane + i], paths.indices[lane + i] = combine(key, _CHANCE), index + i
     for i in range(LANES):
@@ -151,7 +164,7 @@ def draw_lights(
         fill_plane(
             pattern, size * shadow_rays, key, film.column + run[RUN_PIXEL], film.row + r, DIM_LIGHT,
             index * shadow_rays + k, shadow_rays, run[RUN_LANE], run[RUN_LANES], numbers, paths.numbers,
-            LIGHT_U, LIGHT_V,
+            np.int64(LIGHT_U), np.int64(LIGHT_V),
         )  # fmt: skip
 
 

@@ -34,7 +34,7 @@ from aliasbench.renderers.sampling.patterns import (
     sequence_point,
     stream_keys,
 )
-from aliasbench.renderers.sampling.sobol import TABLE_BITS, scrambled_unit, shuffled, sobol_bits
+from aliasbench.renderers.sampling.sobol import TABLE_BITS, scrambled_unit, shuffled
 from aliasbench.scenes.model import FloatArray
 
 KeyArray = NDArray[np.uint64]
@@ -42,6 +42,7 @@ KeyArray = NDArray[np.uint64]
 # Over every sample number (2^24 at most): tells the compiler that none is negative, which spares a check for each lane.
 INDEX_MASK = 0x1FFFFFF
 SHORT = 1 << TABLE_BITS
+START, ALL = np.int64(0), np.int64(LANES)  # a whole packet, in calls (see `patterns` on such integers)
 BATCH = 0x5A17  # what the keys of a pixel's later samples are derived with
 
 # Rows of the keys of a row's pixels: of the pixel, of the streams of x and y, and what columns start from.
@@ -65,8 +66,12 @@ def fill_keys(pattern: Pattern, first_column: int, row: int, keys: KeyArray) -> 
     value = SHARED if pattern.shared else row
     for k in range(keys.shape[1]):
         keys[PIXEL, k] = combine(keys[COLUMN, k], value)
+    if pattern.sampler == BLUENOISE:
+        for k in range(keys.shape[1]):
+            keys[FIRST, k], keys[SECOND, k] = stream_keys(pattern, keys[PIXEL, k], first_column + k, row, DIM_X)
+        return
     for k in range(keys.shape[1]):
-        keys[FIRST, k], keys[SECOND, k] = stream_keys(pattern, keys[PIXEL, k], first_column + k, row, DIM_X)
+        keys[FIRST, k], keys[SECOND, k] = combine(keys[PIXEL, k], DIM_X), combine(keys[PIXEL, k], DIM_X + 1)
 
 
 def orders_size(pattern: Pattern) -> int:
@@ -84,6 +89,31 @@ def _fill_orders(pattern: Pattern, first: int, second: int, orders: NDArray[np.i
     for longer in range(2 if shortest * rows < pattern.samples else 1):
         for k in range(shortest + longer):
             orders[1 + longer, k] = column_order(k, shortest + longer, second)
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def _fill_rare(
+    pattern: Pattern, first: int, second: int, index: int, lane: int, run: int, left: float, top: float,
+    orders: NDArray[np.int32], scratch: FloatArray,
+) -> None:  # fmt: skip
+    """Do what `fill_run` does, for the samplers that are not worth being compiled into every kernel."""
+    if pattern.sampler == MULTIJITTERED:
+        if index == 0:
+            _fill_orders(pattern, first, second, orders)
+        rows = row_count(pattern.samples)
+        shortest = pattern.samples // rows
+        for k in range(run):
+            i = (index + k) & INDEX_MASK
+            column, longer = pattern.places[1, i], pattern.places[2, i]
+            u = (orders[0, pattern.places[0, i]] + unit(first, i)) / rows
+            v = (orders[1 + longer, column] + unit(second, i)) / (shortest + longer)
+            scratch[PX + lane + k] = left + (pattern.cells[0, i] + pattern.cells[2, i] * u)
+            scratch[PY + lane + k] = top + (pattern.cells[1, i] + pattern.cells[3, i] * v)
+        return
+    for k in range(run):
+        scratch[PX + lane + k] = left + sequence_point(pattern, 0, index + k, first)
+    for k in range(run):
+        scratch[PY + lane + k] = top + sequence_point(pattern, 1, index + k, second)
 
 
 @njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
@@ -104,37 +134,17 @@ def fill_run(
             scratch[PY + lane + k] = top + pattern.cells[1, i]
         return
     first, second = keys[FIRST, place], keys[SECOND, place]
-    if sampler == BLUENOISE:
-        for k in range(run):
-            scratch[PX + lane + k] = left + sequence_point(pattern, 0, index + k, first)
-        for k in range(run):
-            scratch[PY + lane + k] = top + sequence_point(pattern, 1, index + k, second)
+    if sampler in (MULTIJITTERED, BLUENOISE) or (sampler == SOBOL and index + run > SHORT):
+        _fill_rare(pattern, first, second, index, lane, run, left, top, orders, scratch)
         return
     if sampler == SOBOL:
         key_x, key_y = np.uint32(first), np.uint32(second)
-        if index + run <= SHORT:
-            for k in range(run):
-                i = (index + k) & INDEX_MASK
-                scratch[PX + lane + k] = left + scrambled_unit(pattern.tables[0, 0, i], key_x)
-                scratch[PY + lane + k] = top + scrambled_unit(pattern.tables[0, 1, i], key_y)
-            return
-        for k in range(run):
-            word = np.uint32(index + k)
-            scratch[PX + lane + k] = left + scrambled_unit(sobol_bits(pattern.tables, 0, word), key_x)
-            scratch[PY + lane + k] = top + scrambled_unit(sobol_bits(pattern.tables, 1, word), key_y)
-        return
-    if sampler == MULTIJITTERED:
-        if index == 0:
-            _fill_orders(pattern, first, second, orders)
-        rows = row_count(pattern.samples)
-        shortest = pattern.samples // rows
         for k in range(run):
             i = (index + k) & INDEX_MASK
-            column, longer = pattern.places[1, i], pattern.places[2, i]
-            u = (orders[0, pattern.places[0, i]] + unit(first, i)) / rows
-            v = (orders[1 + longer, column] + unit(second, i)) / (shortest + longer)
-            scratch[PX + lane + k] = left + (pattern.cells[0, i] + pattern.cells[2, i] * u)
-            scratch[PY + lane + k] = top + (pattern.cells[1, i] + pattern.cells[3, i] * v)
+            scratch[PX + lane + k] = left + scrambled_unit(pattern.tables[0, 0, i], key_x)
+        for k in range(run):
+            i = (index + k) & INDEX_MASK
+            scratch[PY + lane + k] = top + scrambled_unit(pattern.tables[0, 1, i], key_y)
         return
     for k in range(run):
         i = (index + k) & INDEX_MASK
@@ -173,9 +183,9 @@ def fill_positions(
     index = (first - column * pattern.samples) & INDEX_MASK
     if pattern.samples - index >= LANES:
         # A loop of constant length is what the compiler vectorises best, and this is the common case.
-        fill_run(pattern, keys, column, index, 0, LANES, float(column), float(row), orders, scratch)
+        fill_run(pattern, keys, column, index, START, ALL, float(column), float(row), orders, scratch)
         return
-    lane = 0
+    lane = START
     while lane < lanes:
         run = min(lanes - lane, pattern.samples - index)
         fill_run(pattern, keys, column, index, lane, run, float(column), float(row), orders, scratch)
@@ -217,7 +227,7 @@ def fill_line(
     order = line_order(pattern, key, column, row, dimension)
     if run == LANES:
         # loops of constant length, as in `fill_positions`
-        _fill_line(pattern, count, stream, order, dimension, index, 0, LANES, numbers, scratch, at)
+        _fill_line(pattern, count, stream, order, dimension, index, START, ALL, numbers, scratch, at)
     else:
         _fill_line(pattern, count, stream, order, dimension, index, lane, run, numbers, scratch, at)
 
@@ -261,7 +271,7 @@ def fill_plane(
     order = plane_order(pattern, key, column, row, dimension)
     if run == LANES and step == 1:
         # loops of constant length, as in `fill_positions`
-        _fill_plane(pattern, count, first, second, order, index, 1, 0, LANES, numbers, scratch, at_u, at_v)
+        _fill_plane(pattern, count, first, second, order, index, step, START, ALL, numbers, scratch, at_u, at_v)
     else:
         _fill_plane(pattern, count, first, second, order, index, step, lane, run, numbers, scratch, at_u, at_v)
 
@@ -295,10 +305,10 @@ def fill_times(
     """Write the shutter positions of `lanes` samples of a row from its sample number `first` on."""
     count = pattern.samples
     column, index = first // count, first % count
-    lane = 0
+    lane = START
     while lane < lanes:
         run = min(lanes - lane, count - index)
         key = keys[PIXEL, column]
-        fill_line(pattern, count, key, column, row, DIM_TIME, index, lane, run, numbers, scratch, TIME)
+        fill_line(pattern, count, key, column, row, DIM_TIME, index, lane, run, numbers, scratch, np.int64(TIME))
         lane += run
         column, index = column + 1, 0

@@ -135,22 +135,11 @@ def shade_textured(tables: Tables, camera: FloatArray, hits: NDArray[np.int32], 
         return
     if same and first < tables.firsts[0]:
         place_packet(tables, camera, first, scratch)
-        shade_packet(tables.objects, tables.owners[first], tables.levels, tables.texels, scratch)
-        return
-    owner = _place_triangles(tables, hits, scratch)
-    if owner != MISS:
-        shade_packet(tables.objects, owner, tables.levels, tables.texels, scratch)
-        return
-    owner = tables.owners[first] if first != MISS else MISS
-    for i in range(LANES):
-        hit = hits[i]
-        if hit == MISS:
-            owner = MISS
-        else:
-            if tables.owners[hit] != owner:
-                owner = MISS
-            if tables.objects[tables.owners[hit], KIND] != PLAIN:
-                place_lane(tables, camera, hit, scratch, i)
+        owner = np.int64(tables.owners[first])
+    else:
+        owner = np.int64(_place_triangles(tables, hits, scratch))
+        if owner == MISS:
+            owner = _place_lanes(tables, camera, hits, scratch)
     if owner != MISS and tables.objects[owner, KIND] != PLAIN:
         shade_packet(tables.objects, owner, tables.levels, tables.texels, scratch)
         return
@@ -160,6 +149,22 @@ def shade_textured(tables: Tables, camera: FloatArray, hits: NDArray[np.int32], 
             _paint_lane(tables, hit, scratch, i)
         else:
             shade_lane(tables.objects, tables.owners[hit], tables.levels, tables.texels, scratch, i)
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def _place_lanes(tables: Tables, camera: FloatArray, hits: NDArray[np.int32], scratch: FloatArray) -> int:
+    """Write texture coordinates, and levels of detail where needed, of any hits; return their object, or MISS."""
+    owner = np.int64(tables.owners[hits[0]] if hits[0] != MISS else MISS)
+    for i in range(LANES):
+        hit = hits[i]
+        if hit == MISS:
+            owner = np.int64(MISS)
+        else:
+            if tables.owners[hit] != owner:
+                owner = np.int64(MISS)
+            if tables.objects[tables.owners[hit], KIND] != PLAIN:
+                place_lane(tables, camera, hit, scratch, i)
+    return owner
 
 
 @njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)

@@ -171,9 +171,10 @@ class PreparedRaytrace:
         self._footprint = float(technique.shading_samples) ** -0.5
         self._mesh_key: tuple[int, ...] = ()
         self._still = self._moving = build_ownership((), placed=False)
-        self._optics = make_optics(technique)
+        self._optics = make_optics(technique, size[0])
         self._room = Room()
-        self._is_plain = is_plain(technique) and scene.camera.lens_radius == 0.0 and not self._is_scattered
+        has_lens = scene.camera.lens_radius > 0.0
+        self._is_plain = is_plain(technique, self._optics) and not has_lens and not self._is_scattered
         exposure = plan_exposure(scene, technique, size, self._bodies, 0)
         meshes = [body_mesh(body, self._looks) for body in exposure.moving]
         engine.set_moving(meshes)

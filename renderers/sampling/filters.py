@@ -25,6 +25,8 @@ from aliasbench.scenes.errors import InputError, unknown_name
 from aliasbench.scenes.model import FloatArray, read_only
 
 BOX, TENT, CONE, GAUSSIAN, MITCHELL, LANCZOS = 0, 1, 2, 3, 4, 5
+LEAST = 1e-9  # of a radius or sigma: the values of narrower filters, and their squares, would leave float32's range
+MOST_LOBES = 256.0  # the Lanczos filter's integral has a table that grows with its radius
 FAR_SIGMAS = 8.3  # beyond it a Gaussian profile has less than 1e-16 of its mass
 _CODE, _RADIUS, _SIGMA, _NORM, _PARTS, _TABLE = 0, 1, 2, 3, 4, 5
 _MITCHELL_ZERO = 4.0 / 7.0  # where its lobe begins, as a share of the radius
@@ -169,9 +171,9 @@ def make_filter(name: str, radius: float, sigma: float = 0.5) -> FilterSpec:
     name : str
         A key of `FILTERS`.
     radius : float
-        Above 0; inf for the Gaussian alone.
+        From 1e-9; inf for the Gaussian alone, at most 256 for Lanczos.
     sigma : float
-        Of the Gaussian, above 0.
+        Of the Gaussian, from 1e-9.
 
     Raises
     ------
@@ -184,6 +186,11 @@ def make_filter(name: str, radius: float, sigma: float = 0.5) -> FilterSpec:
         raise InputError(f"radius={radius:g}: must be a finite number above 0, or inf with filter=gaussian")
     if not 0.0 < sigma < math.inf:
         raise InputError(f"sigma={sigma:g}: must be a finite number above 0")
+    for key, value in (("radius", radius), ("sigma", sigma)):
+        if value < LEAST:
+            raise InputError(f"{key}={value:g}: must be at least {LEAST:g} pixels")
+    if name == "lanczos" and radius > MOST_LOBES:
+        raise InputError(f"radius={radius:g}: must be at most {MOST_LOBES:g} with filter=lanczos")
     kind = FILTERS[name]
     norm, table, parts = 1.0, np.empty(0), 0
     if kind.code == GAUSSIAN:

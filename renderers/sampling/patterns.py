@@ -59,7 +59,8 @@ SAMPLERS: Mapping[str, int] = {
 }
 
 # Dimensions: each has a stream of its own; lens, light and direction take two.
-DIM_X, DIM_Y, DIM_TIME, DIM_LENS, DIM_LIGHT, DIM_WAVELENGTH, DIM_DIRECTION = 0, 1, 2, 3, 5, 7, 8
+# Kernels are compiled anew for each plain integer that is written out in a call, but once for all of numpy's.
+DIM_X, DIM_TIME, DIM_LENS, DIM_LIGHT, DIM_WAVELENGTH, DIM_DIRECTION = (np.int64(d) for d in (0, 2, 3, 5, 7, 8))
 DIMENSIONS = 10
 _ORDER, _COLUMNS, _ROWS = 1, 2, 3  # what streams are derived from a dimension's
 _MOST_NUMBERS = 2**24
@@ -203,7 +204,7 @@ def row_order(row: int, rows: int, stream: int) -> int:
     return permute(row, rows, combine(stream, _ROWS))
 
 
-@njit(inline="always", cache=True)
+@njit(cache=True)
 def _tile_word(pattern: Pattern, column: int, row: int, dimension: int, word: int) -> np.uint64:
     """Return a word of the tile for a dimension of a pixel."""
     side = len(pattern.tile)
@@ -221,7 +222,7 @@ def sequence_point(pattern: Pattern, dimension: int, number: int, stream: int) -
     return scrambled_unit(bits, np.uint32(stream))
 
 
-@njit(inline="always", cache=True)
+@njit(cache=True)
 def stream_keys(pattern: Pattern, key: int, column: int, row: int, dimension: int) -> tuple[np.uint64, np.uint64]:
     """Return the keys of a dimension and the next for the pixel whose `pixel_key` is `key`."""
     if pattern.sampler == BLUENOISE:
@@ -315,7 +316,7 @@ def shutter_position(pattern: Pattern, count: int, index: int, stream: int, orde
     return line_position(pattern, count, index, stream, order)
 
 
-@njit(inline="always", cache=True)
+@njit(cache=True)
 def line_order(pattern: Pattern, key: int, column: int, row: int, dimension: int) -> np.uint64:
     """Return the key of a single dimension's order for the pixel whose `pixel_key` is `key`."""
     if pattern.sampler == BLUENOISE and not pattern.progressive:
@@ -323,7 +324,7 @@ def line_order(pattern: Pattern, key: int, column: int, row: int, dimension: int
     return combine(combine(key, dimension), _ORDER)
 
 
-@njit(inline="always", cache=True)
+@njit(cache=True)
 def plane_order(pattern: Pattern, key: int, column: int, row: int, dimension: int) -> np.uint64:
     """Return the key of a pair's order for the pixel whose `pixel_key` is `key`."""
     if pattern.sampler == BLUENOISE and not pattern.progressive:
