@@ -64,7 +64,8 @@ class CheckedScene:
         for name, value in (("frame", frame), ("seed", seed)):
             if isinstance(value, bool) or not isinstance(value, Integral) or not 0 <= value <= MAX_NUMBER:
                 raise InputError(f"{name}={value!s:.60}: must be a whole number from 0 to 2^53")
-        return self._inner.render(frame=int(frame), seed=int(seed), progress=progress)
+        told = {} if progress is None else {"progress": progress}
+        return self._inner.render(frame=int(frame), seed=int(seed), **told)
 
     def __enter__(self) -> Self:
         return self

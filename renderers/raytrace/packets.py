@@ -202,6 +202,7 @@ class PacketEngine:
             while not all(other.done() for other in others):
                 progress(min(1.0, int(counter[0]) / max(rows, 1)))
                 time.sleep(_REPORTS_S)
+            progress(1.0)
         for other in others:
             other.result()
 

@@ -6,6 +6,8 @@ neighbours, and any count wastes lanes only at the end of a row. What depends on
 multijittered rows and columns) is computed once for it.
 """
 
+from typing import Any
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -42,7 +44,9 @@ KeyArray = NDArray[np.uint64]
 # Over every sample number (2^24 at most): tells the compiler that none is negative, which spares a check for each lane.
 INDEX_MASK = 0x1FFFFFF
 SHORT = 1 << TABLE_BITS
-START, ALL = np.int64(0), np.int64(LANES)  # a whole packet, in calls (see `patterns` on such integers)
+# A whole packet, in calls (see `patterns` on such integers).
+START: Any = np.int64(0)
+ALL: Any = np.int64(LANES)
 BATCH = 0x5A17  # what the keys of a pixel's later samples are derived with
 
 # Rows of the keys of a row's pixels: of the pixel, of the streams of x and y, and what columns start from.

@@ -164,7 +164,7 @@ def _place_lanes(tables: Tables, camera: FloatArray, hits: NDArray[np.int32], sc
                 owner = np.int64(MISS)
             if tables.objects[tables.owners[hit], KIND] != PLAIN:
                 place_lane(tables, camera, hit, scratch, i)
-    return owner
+    return int(owner)
 
 
 @njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)

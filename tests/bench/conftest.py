@@ -46,8 +46,10 @@ class FakePrepared:
     technique: Technique
     size: tuple[int, int]
 
-    def render(self, frame: int = 0, seed: int = 0) -> Frame:
+    def render(self, frame: int = 0, seed: int = 0, progress: Callable[[float], None] | None = None) -> Frame:
         """Return the hashed picture; references are the truth for all with an uncertainty of 1e-9."""
+        if progress is not None:
+            progress(1.0)
         text = self.technique.text
         problem = self.fakes.fail(self.scene.name, text, self.fakes.rendered(text))
         self.fakes.log.append((self.scene.name, text, frame, seed))
