@@ -32,7 +32,9 @@ from aliasbench.renderers.sampling.patterns import (
 )
 from aliasbench.scenes.model import FloatArray
 
+# bluenoise has a pattern of its own for each pixel, and its tile is the one for the samples, not for the shadow rays.
 NAMES = tuple(name for name in SAMPLERS if name != "bluenoise")
+KINDS = [("bluenoise", False), *((name, shared) for name in NAMES for shared in (False, True))]
 COUNTS = (1, 3, 7, 16, 50, 4096 + 5)
 WIDTH, FIRST_COLUMN, ROW = 3, 4, 9
 SEED, FRAME = 11, 4
@@ -66,9 +68,8 @@ def runs_of(count: int) -> list[tuple[int, int, int]]:
     return [pieces[k] for k in np.random.default_rng(count).permutation(len(pieces))]
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize(("name", "shared"), KINDS)
 @pytest.mark.parametrize("count", COUNTS)
-@pytest.mark.parametrize("shared", [False, True])
 def test_packets_hold_the_places_and_times_of_the_shared_definition(name: str, count: int, shared: bool) -> None:
     pattern = make_test_pattern(name, count, shared)
     keys = make_keys(pattern, 0)
@@ -87,9 +88,8 @@ def test_packets_hold_the_places_and_times_of_the_shared_definition(name: str, c
     np.testing.assert_allclose(np.concatenate(got), expected.reshape(-1, 3), rtol=0, atol=4e-15)
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize(("name", "shared"), KINDS)
 @pytest.mark.parametrize("count", COUNTS)
-@pytest.mark.parametrize("shared", [False, True])
 def test_any_run_of_samples_has_the_other_dimensions_of_the_shared_definition(
     name: str, count: int, shared: bool
 ) -> None:
