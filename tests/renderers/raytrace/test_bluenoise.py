@@ -54,9 +54,7 @@ def test_errors_in_penumbrae_are_blue_and_no_larger_than_sobols(text: str, sampl
         rmse[sampler] = float(np.sqrt((e[:, penumbra] ** 2).mean()))
         blue[sampler] = float((blurred[:, penumbra] ** 2).mean() / ((e[:, penumbra] ** 2).mean() * (g**2).sum()))
     ratio = rmse["bluenoise"] / rmse["sobol"]
-    print(
-        f"{text}, {samples} samples: Q {blue['bluenoise']:.2f}, Sobol's {blue['sobol']:.2f}; RMSE {ratio:.3f} of Sobol's"
-    )
+    print(f"{text}, {samples}: Q {blue['bluenoise']:.2f}, Sobol's {blue['sobol']:.2f}; RMSE {ratio:.3f} of Sobol's")
     assert 0.88 <= blue["sobol"] <= 1.12
     assert blue["bluenoise"] <= 0.6
     assert 0.95 <= ratio <= 1.05
