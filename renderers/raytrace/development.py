@@ -227,6 +227,7 @@ class Development:
             optics.margin,
             optics.reach,
             optics.spread,
+            -math.inf if optics.spec.gain > 1.0 else 0.0,
             not optics.spec.kind.separable,
             optics.profile,
             optics.warp,

@@ -61,6 +61,8 @@ class Film(NamedTuple):
     margin : int
     radius, spread : float
         Of the filter, and the side of the square that samples are spread over, in pixels.
+    least : float
+        The least value of a profile: 0, or minus infinity of filters with lobes.
     radial : bool
         The filter is a cone; else it is the product of a profile along x and y.
     profile : (pieces, 2 margin + 1, terms) float64
@@ -81,6 +83,7 @@ class Film(NamedTuple):
     margin: int
     radius: float
     spread: float
+    least: float
     radial: bool
     profile: FloatArray
     warp: Warp
@@ -269,7 +272,7 @@ def _weigh_runs(
         for i in range(run[RUN_LANE], run[RUN_LANE] + run[RUN_LANES]):
             scratch[PX + i] -= x
             scratch[PY + i] -= y
-    weigh_lanes(film.profile, 0.5 * film.spread, film.radius, scratch, PX, weights, room)
+    weigh_lanes(film.profile, 0.5 * film.spread, film.radius, film.least, scratch, PX, weights, room)
 
 
 @njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)

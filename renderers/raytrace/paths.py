@@ -89,7 +89,7 @@ PATH_SIZE = 304
 BROUGHT = LENS_X
 
 _OFF_SURFACE = 2e-6  # some 30 ulp of float32: twice what intersection may be off
-_BEFORE_LIGHT = 1e-4  # of the way, which shadow rays stop short of their light
+_BEFORE_LIGHT = 1e-4  # of the way, which shadow rays stop short of their light at least
 _CHANCE = 0x7A7B  # what keys of a path's later random numbers are derived with
 _NUMBERS_EACH = 8
 
@@ -332,7 +332,10 @@ def aim_at_lights(
         if not (here > 0.0 and there > 0.0 and square > 0.0):
             continue
         x, y, z = _off_surface(rows, i, dx, dy, dz)
-        write_lane(shadow, ray, i, x, y, z, px - x, py - y, pz - z, 1.0 - _BEFORE_LIGHT)
+        # Far from where coordinates start, the light's own surface may lie before it by rounding.
+        unsure = (rows[STEP + i] + _OFF_SURFACE * max(abs(px), abs(py), abs(pz))) / np.sqrt(square)
+        far = max(1.0 - max(_BEFORE_LIGHT, unsure), 0.0)
+        write_lane(shadow, ray, i, x, y, z, px - x, py - y, pz - z, far)
         shadow[TIME + i] = scratch[TIME + i]
         weight *= light[AREA] * here * there / (np.pi * square * square * light[CHANCE])
         for c in range(3):
@@ -346,7 +349,7 @@ def aim_at_lights(
 def take_light(paths: Paths, shadow: FloatArray, ray: NDArray[np.float32], valid: NDArray[np.int32]) -> None:
     """Count the light of shadow rays that arrived: those that Embree has not ended (at minus infinity)."""
     for i in range(LANES):
-        if valid[i] != 0 and ray[RAY_TFAR + i] > 0.0:
+        if valid[i] != 0 and ray[RAY_TFAR + i] >= 0.0:
             for c in range(3):
                 paths.numbers[SEEN + c * LANES + i] += shadow[BROUGHT + c * LANES + i]
 

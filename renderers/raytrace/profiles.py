@@ -116,13 +116,14 @@ def _run_polynomial(typing_context: Any, coefficients: Any, places: Any, out: An
 
 @njit(cache=True, error_model="numpy", _nrt=False)
 def weigh_lanes(
-    polynomials: FloatArray, half: float, radius: float, offsets: FloatArray, at: int, weights: FloatArray,
-    room: FloatArray,
+    polynomials: FloatArray, half: float, radius: float, least: float, offsets: FloatArray, at: int,
+    weights: FloatArray, room: FloatArray,
 ) -> None:  # fmt: skip
     """Write the profile's values for 16 offsets across and 16 up from the middles of pixels, in `offsets` from `at` on.
 
     Row j of `weights` (2 margin + 1, 2 LANES) is for the j-th of the columns in reach, from the left, and of the rows,
-    from the top. `room` is (4, 2 LANES).
+    from the top. No value is below `least`: 0 for filters without lobes, whatever polynomials round to. `room` is
+    (4, 2 LANES).
     """
     lanes = hidden(2 * LANES)  # both axes in one loop: as long as the compiler's unrolled vectors
     taps = polynomials.shape[1]
@@ -142,7 +143,7 @@ def weigh_lanes(
             for i in range(lanes):
                 own[i] = own[i] if abs(far[i] - middle) <= 0.5 * radius else outer[i]
         for i in range(lanes):
-            own[i] = own[i] if abs(far[i] - middle) <= radius else 0.0
+            own[i] = max(own[i], least) if abs(far[i] - middle) <= radius else 0.0
     for j in range(margin):
         left, right = weights[j], weights[taps - 1 - j]
         for i in range(lanes):

@@ -53,6 +53,7 @@ CHANGED = {
     "lights": (Light(((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)), (1, 1, 1)),),
     "background": (0.0, 0.0, 0.1),
     "contrast": 0.5,
+    "bounces": 1,
     "animation": Animation(frames=2),
     "facts": Facts(edges=(EdgeFact((0, 0, 0), (1, 0, 0)),)),
 }
