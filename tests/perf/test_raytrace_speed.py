@@ -71,3 +71,26 @@ def test_packets_are_four_times_faster_than_single_rays(benchmark: Any, robust: 
         ratio = best["portable"] / best["packet"]
         print(f"\nrobust={robust}: packets {ratio:.1f} times faster than single rays")
         assert ratio >= 4.0
+
+
+@pytest.mark.parametrize("cells", CELLS)
+def test_share_of_time_inside_embree(benchmark: Any, cells: int) -> None:
+    # The same kernel over the same packets, told that there is no mesh: what is missing is rtcIntersect16, and the
+    # look-up of what it hits, so that the share is a little too large.
+    side, rounds = (512, 9) if benchmark.enabled else (32, 1)
+    times: dict[bool, list[float]] = {True: [], False: []}
+    with prepare(relief_scene(cells), "raytrace:spp=16,sampler=sobol", size=(side, side)) as prepared:
+        inner: Any = prepared._inner  # the engine that is told so is nobody else's business
+        for _ in range(rounds):
+            for has_mesh in times:
+                inner._engine._has_still = has_mesh
+                started = time.perf_counter()
+                pixels = prepared.render().pixels
+                times[has_mesh].append(time.perf_counter() - started)
+                assert (pixels.max() > 0.0) == has_mesh
+        inner._engine._has_still = True
+        benchmark.pedantic(prepared.render, rounds=1)
+    share = 1.0 - np.median(times[False]) / np.median(times[True])
+    assert share < 1.0
+    if benchmark.enabled:
+        print(f"\n{2 * cells**2} triangles: {share:.0%} of the time is inside rtcIntersect16")
