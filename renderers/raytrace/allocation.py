@@ -5,7 +5,8 @@ stratified ones it is what an edge leaves, the worst that is not noise: over d d
 edge runs through n^(1 - 1/d) of them, and the variance falls as n^-(1 + 1/d) (Mitchell 1996).
 
 A pixel that must not look at itself looks at its four neighbours across its sides. An edge through it leaves it by two
-of them, so that two vary: the second largest variance is taken for its own. Or the edge is so close to a side that two
+of them, so that two vary, and the lesser variance is taken for its own: of two on opposite sides. Of two that meet in a
+corner the edge may cut off just that, or pass by beyond it, and their variance counts for less. Or the edge is so close to a side that two
 opposite neighbours are flat and different: then it is in between. What varies on one side alone is an edge that passes
 by, and counts for a part of its variance: pilots may have missed where it comes in.
 """
@@ -23,7 +24,7 @@ from aliasbench.scenes.model import FloatArray, Scene
 
 CountArray = NDArray[np.int32]
 
-_ONE_SIDED = 0.01
+_ONE_SIDED, _CORNER = 0.01, 0.4
 _LANES = 16
 
 
@@ -108,8 +109,7 @@ def neighbour_numbers(
                 if above > 0.0 or below > 0.0:
                     along = 0.0
                 a, b = max(left, right), max(above, below)
-                second = max(min(a, b), min(left, right), min(above, below))
-                variance = max(second, _ONE_SIDED * max(a, b))
+                variance = max(_CORNER * min(a, b), min(left, right), min(above, below), _ONE_SIDED * max(a, b))
                 if alone:
                     variance = max(variance, own[y, x])
             else:
