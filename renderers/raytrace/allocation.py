@@ -6,9 +6,9 @@ edge runs through n^(1 - 1/d) of them, and the variance falls as n^-(1 + 1/d) (M
 
 A pixel that must not look at itself looks at its four neighbours across its sides. An edge through it leaves it by two
 of them, so that two vary, and the lesser variance is taken for its own: of two on opposite sides. Of two that meet in a
-corner the edge may cut off just that, or pass by beyond it, and their variance counts for less. Or the edge is so close to a side that two
-opposite neighbours are flat and different: then it is in between. What varies on one side alone is an edge that passes
-by, and counts for a part of its variance: pilots may have missed where it comes in.
+corner the edge may cut off just that, or pass by beyond it, and their variance counts for less. Or the edge is so close
+to a side that two opposite neighbours are flat and different: then it is in between. What varies on one side alone is
+an edge that passes by, and counts for a part of its variance: pilots may have missed where it comes in.
 """
 
 import math
