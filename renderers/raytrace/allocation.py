@@ -100,21 +100,17 @@ def neighbour_numbers(
     for r in range(first, after):
         for k in range(out.shape[1]):
             y, x = r + 1, k + 1
-            across = _gap(film, least, y, x - 1, y, x + 1)
-            along = _gap(film, least, y - 1, x, y + 1, x)
+            variance, a, b = 0.0, 0.0, 0.0
             if least > 1:
                 left, right, above, below = own[y, x - 1], own[y, x + 1], own[y - 1, x], own[y + 1, x]
-                if left > 0.0 or right > 0.0:
-                    across = 0.0
-                if above > 0.0 or below > 0.0:
-                    along = 0.0
                 a, b = max(left, right), max(above, below)
                 variance = max(_CORNER * min(a, b), min(left, right), min(above, below), _ONE_SIDED * max(a, b))
                 if alone:
                     variance = max(variance, own[y, x])
-            else:
-                variance = 0.0
-            variance = max(variance, 0.25 * max(across, along))
+            if a <= 0.0:
+                variance = max(variance, 0.25 * _gap(film.shifts, y, x - 1, y, x + 1))
+            if b <= 0.0:
+                variance = max(variance, 0.25 * _gap(film.shifts, y - 1, x, y + 1, x))
             wanted = wanted_number(variance, tolerance, exponent, least, most)
             if wanted > least:
                 # whole packets beside the pilot
@@ -122,14 +118,13 @@ def neighbour_numbers(
             out[r, k] = wanted
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def _gap(film: Film, least: int, y0: int, x0: int, y1: int, x1: int) -> float:
-    """Return the squared difference of two pilots' means, the largest of the channels."""
+@njit(cache=True, forceinline=True, nogil=True, error_model="numpy")
+def _gap(shifts: FloatArray, y0: int, x0: int, y1: int, x1: int) -> float:
+    """Return the squared difference of two pixels whose samples are all the same, the largest of the channels."""
     largest = 0.0
     for c in range(3):
-        a = film.shifts[y0, x0, c] + film.sums[y0, x0, c] / least
-        b = film.shifts[y1, x1, c] + film.sums[y1, x1, c] / least
-        largest = max(largest, (a - b) * (a - b))
+        gap = shifts[y0, x0, c] - shifts[y1, x1, c]
+        largest = max(largest, gap * gap)
     return largest
 
 

@@ -45,6 +45,7 @@ _MOST_BYTES = 2 << 30
 # Beyond so many sigmas a Gaussian has 4e-9 of its mass, and weights get down to what polynomials leave of it (1e-9 of
 # the peak): they could be negative, and sums of them anything.
 _FAR_SIGMAS = 6.0
+_LANES = 16  # of a packet
 _PILOT = 0x9110  # what the key of a discarded pilot is derived with
 # Under a filter with lobes few samples can have weights that nearly cancel, and a quotient of them is anything; see
 # `_resolve`. Of single samples of a pixel 7 % do (lanczos), of four 0.1 %, of sixteen none.
@@ -207,9 +208,12 @@ class Development:
 
     def _film(
         self, row: int, column: int, begins: CountArray, ends: CountArray, *, sums: bool = False, squares: bool = False,
-        numbers: CountArray | None = None,
+        each: int = 0, numbers: CountArray | None = None,
     ) -> Film:  # fmt: skip
-        """Return a film for sums, with or without squares, or for splats of samples that weigh 1 / `numbers`."""
+        """Return a film for sums, with or without squares, or for splats of samples that weigh 1 / `numbers`.
+
+        Every pixel takes its first `each` samples, unless it is 0.
+        """
         rows, columns = begins.shape
         optics = self.optics
         empty = np.zeros((0, 0, 0))
@@ -219,6 +223,7 @@ class Development:
             column,
             begins,
             ends,
+            each if 0 < each < _LANES and _LANES % each == 0 else 0,
             self.room.zeros("shifts", (rows, columns, 3)) if squares else empty,
             self.room.zeros("sums", (rows, columns, 3)) if sums else empty,
             self.room.zeros("squares", (rows, columns, 3)) if squares else empty,
@@ -273,13 +278,14 @@ class Development:
         ring = 1 if t.adaptive == "unbiased" else 0
         shape = (after - first + 2 * ring, self.size[0] + 2 * (margin + ring))
         begins, ends = np.zeros(shape, np.int32), np.full(shape, t.min_spp, np.int32)
-        film = self._film(first - ring, -margin - ring, begins, ends, sums=True, squares=True)
+        film = self._film(first - ring, -margin - ring, begins, ends, sums=True, squares=True, each=t.min_spp)
         pattern = self.pattern
         if self._discards:
             name = "random" if pattern.sampler == RANDOM else "sobol"
             start = int(combine(pattern.start, _PILOT))
             pattern = make_pattern(name, t.max_spp, start, shared=False, progressive=True)
         self.expose(pattern, film)
+        film = film._replace(each=0)
         if t.adaptive == "pooled":
             return self._pool(film, ends)
         numbers = self._needed(film, ends)
@@ -293,7 +299,7 @@ class Development:
         if not self.optics.is_splat:
             ends = ends.copy()
             ends[1:-1, 1:-1] = numbers
-            self.expose(self.pattern, film._replace(begins=film.ends, ends=ends))
+            self.expose(self.pattern, film._replace(begins=film.ends, ends=ends, squares=np.zeros((0, 0, 0))))
         return film, numbers, [(np.zeros_like(numbers), pilots), (pilots, numbers)]
 
     def _pool(self, film: Film, numbers: CountArray) -> tuple[Film, CountArray, list[tuple[CountArray, CountArray]]]:

@@ -17,8 +17,18 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from aliasbench.renderers.raytrace.lanes import BLUE, GREEN, LANES, PX, PY, RED, SIGN
-from aliasbench.renderers.raytrace.positions import ALL, BATCH, PIXEL, SHORT, START, KeyArray, fill_mixed, fill_run
+from aliasbench.renderers.raytrace.lanes import BLUE, GREEN, LANES, LOD, PX, PY, RED, SIGN
+from aliasbench.renderers.raytrace.positions import (
+    ALL,
+    BATCH,
+    PIXEL,
+    SHORT,
+    START,
+    KeyArray,
+    fill_even,
+    fill_mixed,
+    fill_run,
+)
 from aliasbench.renderers.raytrace.profiles import add_taps, weigh_lanes
 from aliasbench.renderers.sampling.hashing import combine
 from aliasbench.renderers.sampling.patterns import (
@@ -50,10 +60,12 @@ class Film(NamedTuple):
         Where the film's first row and column lie in the image; they may lie outside of it.
     begins, ends : (rows, width) int32
         The samples [begin, end) that each pixel takes.
+    each : int
+        A part of 16: every pixel takes its first so many samples, and nothing has been summed yet. Else 0.
     shifts, sums, squares : (rows, width, 3) float64
         The first sample of each pixel, and sums of the differences from it and of their squares: means and variances
-        of any range of values keep their digits. `shifts` and `squares` are empty where only sums are wanted; then no
-        difference is taken. All are empty where samples are splatted.
+        of any range of values keep their digits. `squares` is empty where variances are not wanted (any more), and
+        `shifts` too where only sums are; then no difference is taken. All are empty where samples are splatted.
     scales : (rows, width) float64
         What the samples of a pixel are weighted with beside the filter; empty for `sums`.
     splats : (rows, 2 margin + 1, image width, 4) float64
@@ -75,6 +87,7 @@ class Film(NamedTuple):
     column: int
     begins: NDArray[np.int32]
     ends: NDArray[np.int32]
+    each: int
     shifts: FloatArray
     sums: FloatArray
     squares: FloatArray
@@ -116,6 +129,53 @@ def next_runs(film: Film, r: int, cursor: IntArray, runs: IntArray) -> tuple[int
 
 
 @njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+def is_even(pattern: Pattern, film: Film) -> bool:
+    """Return whether `place_even` and `add_even` can serve, which do the same as the functions for runs, but faster."""
+    return film.each > 0 and film.warp.code == IDENTITY and pattern.sampler == SOBOL and pattern.samples <= SHORT
+
+
+@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+def place_even(film: Film, keys: KeyArray, r: int, first: int, room: FloatArray, scratch: FloatArray) -> None:
+    """Write the image positions of a packet from a row's sample number `first` on, every pixel taking `film.each`.
+
+    `room` is from `start_even`.
+    """
+    y = film.row + r + 0.5
+    fill_even(keys, film.each, first // film.each, film.begins.shape[1] - 1, film.column + 0.5, room, scratch)
+    for i in range(LANES):
+        scratch[PX + i] = film.spread * (scratch[PX + i] - 0.5) + scratch[LOD + i]
+    for i in range(LANES):
+        scratch[PY + i] = film.spread * (scratch[PY + i] - 0.5) + y
+
+
+@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+def add_even(film: Film, r: int, first: int, lanes: int, scratch: FloatArray) -> None:
+    """Write the sums of a packet's pixels to the film, every pixel taking `film.each` samples."""
+    each = film.each
+    if each == 4 and lanes == LANES:
+        # loops of constant length, as in `fill_positions`
+        for p in range(LANES // 4):
+            _add_first(film, r, first // 4 + p, 4 * p, START + 4, scratch)
+        return
+    for p in range(lanes // each):
+        _add_first(film, r, first // each + p, each * p, each, scratch)
+
+
+@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+def _add_first(film: Film, r: int, k: int, lane: int, length: int, scratch: FloatArray) -> None:
+    """Write what `_sum_run` adds, of a pixel that it has added nothing to."""
+    for c in range(3):
+        at = RED + c * LANES + lane
+        shift = scratch[at]
+        total, square = 0.0, 0.0
+        for i in range(length):
+            d = scratch[at + i] - shift
+            total += d
+            square += d * d
+        film.shifts[r, k, c], film.sums[r, k, c], film.squares[r, k, c] = shift, total, square
+
+
+@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
 def run_address(pattern: Pattern, film: Film, keys: KeyArray, r: int, run: IntArray) -> tuple[np.uint64, int, int]:
     """Return the key, the size of the set, and the number in it, of a run's first sample.
 
@@ -138,43 +198,38 @@ def place_runs(
 ) -> None:  # fmt: skip
     """Write the image positions of a packet's samples, and the signs of their weights."""
     row = film.row + r
-    if count > 1 and pattern.sampler == SOBOL and pattern.samples <= SHORT:
+    is_plain = film.warp.code == IDENTITY and film.spread == 1.0
+    is_mixed = count > 1 and pattern.sampler == SOBOL and pattern.samples <= SHORT
+    if is_mixed:
         fill_mixed(pattern, keys, runs, count, scratch)
-        runs_to_fill = 0
-    else:
-        runs_to_fill = count
-    for n in range(runs_to_fill):
+    for n in range(0 if is_mixed else count):
         run = runs[n]
         k, lane, length = run[RUN_PIXEL], run[RUN_LANE], run[RUN_LANES]
+        left, top = (float(film.column + k), float(row)) if is_plain else (0.0, 0.0)
         key, size, index = run_address(pattern, film, keys, r, run)
         if size == pattern.samples and key == keys[PIXEL, k]:
             if length == LANES:
-                fill_run(pattern, keys, k, index, START, ALL, 0.0, 0.0, orders, scratch)
+                fill_run(pattern, keys, k, index, START, ALL, left, top, orders, scratch)
             else:
-                fill_run(pattern, keys, k, index, lane, length, 0.0, 0.0, orders, scratch)
+                fill_run(pattern, keys, k, index, lane, length, left, top, orders, scratch)
         else:
             first, second = stream_keys(pattern, key, film.column + k, row, DIM_X)
             rows = row_count(size)
             for i in range(length):
                 u, v = pixel_position(pattern, size, rows, index + i, first, second)
-                scratch[PX + lane + i], scratch[PY + lane + i] = u, v
+                scratch[PX + lane + i], scratch[PY + lane + i] = left + u, top + v
+    if is_plain and not is_mixed:
+        return
     if film.warp.code != IDENTITY:
         warp_lanes(film.warp, scratch, PX, PY, SIGN, LANES)
-    elif film.spread != 1.0:
-        for i in range(2 * LANES):
-            scratch[PX + i] = film.spread * (scratch[PX + i] - 0.5)
     else:
         for i in range(2 * LANES):
-            scratch[PX + i] -= 0.5
+            scratch[PX + i] = film.spread * (scratch[PX + i] - 0.5)
     for n in range(count):
         run = runs[n]
         x = film.column + run[RUN_PIXEL] + 0.5
-        if run[RUN_LANES] == LANES:
-            for i in range(LANES):
-                scratch[PX + i] += x
-        else:
-            for i in range(run[RUN_LANE], run[RUN_LANE] + run[RUN_LANES]):
-                scratch[PX + i] += x
+        for i in range(run[RUN_LANE], run[RUN_LANE] + run[RUN_LANES]):
+            scratch[PX + i] += x
     for i in range(LANES):
         scratch[PY + i] += row + 0.5
 
@@ -245,7 +300,12 @@ def _sum_run(film: Film, r: int, run: IntArray, scratch: FloatArray) -> None:
             film.shifts[r, k, c] = scratch[at + lane]
         shift = film.shifts[r, k, c]
         total, square = 0.0, 0.0
-        if length == LANES:
+        if length == LANES and film.squares.shape[0] == 0:
+            for i in range(4):
+                d0, d1 = scratch[at + i] - shift, scratch[at + i + 4] - shift
+                d2, d3 = scratch[at + i + 8] - shift, scratch[at + i + 12] - shift
+                total += (d0 + d1) + (d2 + d3)
+        elif length == LANES:
             for i in range(4):
                 d0, d1 = scratch[at + i] - shift, scratch[at + i + 4] - shift
                 d2, d3 = scratch[at + i + 8] - shift, scratch[at + i + 12] - shift
@@ -257,7 +317,8 @@ def _sum_run(film: Film, r: int, run: IntArray, scratch: FloatArray) -> None:
                 total += d
                 square += d * d
         film.sums[r, k, c] += total
-        film.squares[r, k, c] += square
+        if film.squares.shape[0] > 0:
+            film.squares[r, k, c] += square
 
 
 @njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from aliasbench.renderers.raytrace.blurs import fill_film_lens, fill_film_times, picture_reach
 from aliasbench.renderers.raytrace.bodies import fill_body_rays, may_see, to_body
 from aliasbench.renderers.raytrace.embree import library_path, load_library
-from aliasbench.renderers.raytrace.film import Film, add_runs, next_runs, place_runs
+from aliasbench.renderers.raytrace.film import Film, add_even, add_runs, is_even, next_runs, place_even, place_runs
 from aliasbench.renderers.raytrace.lanes import (
     HIT_GEOM,
     HIT_INSTANCE,
@@ -32,7 +32,14 @@ from aliasbench.renderers.raytrace.lanes import (
     start_rays,
 )
 from aliasbench.renderers.raytrace.pixel_sums import add_samples
-from aliasbench.renderers.raytrace.positions import KeyArray, fill_columns, fill_keys, fill_positions, fill_times
+from aliasbench.renderers.raytrace.positions import (
+    KeyArray,
+    fill_columns,
+    fill_keys,
+    fill_positions,
+    fill_times,
+    start_even,
+)
 from aliasbench.renderers.raytrace.ray_order import (
     PACKETS,
     SAMPLES,
@@ -242,24 +249,38 @@ def film_static(
     textured = len(tables.triangles) > 0
     fill_columns(pattern, film.column, work.keys)
     start_rays(camera, work.scratch, work.ray)
+    even = is_even(pattern, film)
+    if even:
+        start_even(pattern, film.each, work.room)
     while True:
         r = take_next(counter)
         if r >= film.begins.shape[0]:
             return
         fill_keys(pattern, film.column, film.row + r, work.keys)
         work.cursor[:] = 0
+        first, runs = 0, 0
         while True:
-            lanes, runs = next_runs(film, r, work.cursor, work.runs[0])
-            if lanes == 0:
+            if even:
+                lanes = min(LANES, film.begins.shape[1] * film.each - first)
+            else:
+                lanes, runs = next_runs(film, r, work.cursor, work.runs[0])
+            if lanes <= 0:
                 break
-            place_runs(pattern, film, work.keys, r, work.runs[0], runs, work.orders, work.scratch)
+            if even:
+                place_even(film, work.keys, r, first, work.room, work.scratch)
+            else:
+                place_runs(pattern, film, work.keys, r, work.runs[0], runs, work.orders, work.scratch)
             fill_changing_rays(camera, work.scratch, work.ray)
             trace(scene, work, lanes)
             if textured:
                 shade_textured(tables, camera, work.hits, work.scratch)
             else:
                 shade_flat(tables, work.hits, work.scratch)
-            add_runs(film, r, work.runs[0], runs, work.weights, work.taps, work.room, work.scratch)
+            if even:
+                add_even(film, r, first, lanes, work.scratch)
+                first += LANES
+            else:
+                add_runs(film, r, work.runs[0], runs, work.weights, work.taps, work.room, work.scratch)
 
 
 @njit(nogil=True, cache=True, error_model="numpy", _nrt=False)

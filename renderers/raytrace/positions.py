@@ -178,6 +178,42 @@ def fill_mixed(pattern: Pattern, keys: KeyArray, runs: NDArray[np.int64], count:
         scratch[PY + i] = scrambled_unit(word, np.uint32(scratch[V + i]))
 
 
+@njit(cache=True, error_model="numpy", _nrt=False)
+def start_even(pattern: Pattern, each: int, room: FloatArray) -> None:
+    """Write to `room` (2, LANES or more) what all packets of `fill_even` share: points before they are scrambled."""
+    for dimension in range(2):
+        for i in range(LANES):
+            room[dimension, i] = float(pattern.tables[0, dimension, i & (each - 1)])
+
+
+@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+def fill_even(
+    keys: KeyArray, each: int, column: int, last: int, left: float, room: FloatArray, scratch: FloatArray
+) -> None:
+    """Do what `fill_mixed` does where every pixel from `column` up to `last` takes its first `each` samples.
+
+    `each` is a part of 16, and `room` is from `start_even`. Writes the columns plus `left` to the row LOD, too.
+    """
+    if each == 4:
+        # loops of constant length, as in `fill_positions`
+        _spread_keys(keys, START + 4, column, last, left, scratch)
+    else:
+        _spread_keys(keys, each, column, last, left, scratch)
+    for i in range(LANES):
+        scratch[PX + i] = scrambled_unit(np.uint32(np.int64(room[0, i])), np.uint32(np.int64(scratch[U + i])))
+    for i in range(LANES):
+        scratch[PY + i] = scrambled_unit(np.uint32(np.int64(room[1, i])), np.uint32(np.int64(scratch[V + i])))
+
+
+@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+def _spread_keys(keys: KeyArray, each: int, column: int, last: int, left: float, scratch: FloatArray) -> None:
+    for n in range(LANES // each):
+        k = min(column + n, last)
+        key_x, key_y, x = float(np.uint32(keys[FIRST, k])), float(np.uint32(keys[SECOND, k])), left + (column + n)
+        for i in range(n * each, (n + 1) * each):
+            scratch[U + i], scratch[V + i], scratch[LOD + i] = key_x, key_y, x
+
+
 @njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
 def fill_positions(
     pattern: Pattern, keys: KeyArray, row: int, first: int, lanes: int, orders: NDArray[np.int32], scratch: FloatArray
