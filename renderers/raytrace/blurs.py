@@ -1,9 +1,9 @@
 """Times and lens points of a film's packets: the dimensions beside the place in the picture that blur it."""
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from aliasbench.renderers.kernel_parts import called
 from aliasbench.renderers.raytrace.film import RUN_LANE, RUN_LANES, RUN_PIXEL, Film, IntArray, run_address
 from aliasbench.renderers.raytrace.lanes import LANES, LENS_X, LENS_Y, PX, PY, TIME
 from aliasbench.renderers.raytrace.positions import KeyArray, fill_line, fill_plane
@@ -17,7 +17,7 @@ TIMES, ONE = np.int64(TIME), np.int64(1)
 LENS_U, LENS_V = np.int64(LENS_X), np.int64(LENS_Y)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@called
 def fill_film_times(
     pattern: Pattern, film: Film, keys: KeyArray, r: int, runs: IntArray, count: int, numbers: NDArray[np.int64],
     scratch: FloatArray,
@@ -32,7 +32,7 @@ def fill_film_times(
         )
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@called
 def fill_film_lens(
     pattern: Pattern, film: Film, keys: KeyArray, r: int, runs: IntArray, count: int, numbers: NDArray[np.int64],
     radius: float, scratch: FloatArray,
@@ -51,7 +51,7 @@ def fill_film_lens(
         scratch[LENS_X + i], scratch[LENS_Y + i] = radius * x, radius * y
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@called
 def picture_reach(scratch: FloatArray, lanes: int) -> tuple[float, float, float, float]:
     """Return left, right, top and bottom of a packet's image positions."""
     left, right, top, bottom = np.inf, -np.inf, np.inf, -np.inf

@@ -12,10 +12,10 @@ and velocity), or at x = (M0 + t M1) b + a0 + a1 t (two matrices). s and part of
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from aliasbench.renderers.geometry import LAYER_STEP, Body
+from aliasbench.renderers.kernel_parts import called, inlined
 from aliasbench.renderers.raytrace.lanes import (
     DX,
     DY,
@@ -158,7 +158,7 @@ def _image_bounds(
     return float(left), float(right), float(top), float(bottom)
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+@inlined
 def turn_back(values: FloatArray, c: float, s: float, x: float, y: float, z: float) -> tuple[float, float, float]:
     """Return R^T (x, y, z) for the rotation by (cosine, sine) about the body's axis (Rodrigues)."""
     kx, ky, kz = values[SPIN_AXIS], values[SPIN_AXIS + 1], values[SPIN_AXIS + 2]
@@ -170,7 +170,7 @@ def turn_back(values: FloatArray, c: float, s: float, x: float, y: float, z: flo
     )
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+@inlined
 def _rigid_lane(values: FloatArray, scratch: FloatArray, i: int) -> None:
     time = scratch[TIME + i]
     turns = values[TURNS] + time * values[TURNS_TRAVEL]
@@ -189,7 +189,7 @@ def _rigid_lane(values: FloatArray, scratch: FloatArray, i: int) -> None:
     scratch[MX + i], scratch[MY + i], scratch[MZ + i] = mx, my, mz
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+@inlined
 def _linear_lane(values: FloatArray, scratch: FloatArray, i: int) -> None:
     time = scratch[TIME + i]
     m00 = values[MATRIX] + time * values[MATRIX_TRAVEL]
@@ -219,7 +219,7 @@ def _linear_lane(values: FloatArray, scratch: FloatArray, i: int) -> None:
     scratch[MZ + i] = c * x + f * y + k * z
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+@inlined
 def to_body(values: FloatArray, scratch: FloatArray) -> None:
     """Write the rays of all 16 lanes in the body's frame, in float64, each at its own time."""
     if values[KIND] == RIGID:
@@ -230,7 +230,7 @@ def to_body(values: FloatArray, scratch: FloatArray) -> None:
             _linear_lane(values, scratch, i)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@called
 def lane_to_body(values: FloatArray, scratch: FloatArray, i: int) -> None:
     """Write the ray of one lane in the body's frame."""
     if values[KIND] == RIGID:
@@ -239,7 +239,7 @@ def lane_to_body(values: FloatArray, scratch: FloatArray, i: int) -> None:
         _linear_lane(values, scratch, i)
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+@inlined
 def fill_body_rays(scratch: FloatArray, ray: NDArray[np.float32], body_ray: NDArray[np.float32]) -> None:
     """Write the rays in the body's frame as Embree takes them, ending where the packet's nearest hits are."""
     for i in range(LANES):
@@ -252,7 +252,7 @@ def fill_body_rays(scratch: FloatArray, ray: NDArray[np.float32], body_ray: NDAr
         body_ray[RAY_TFAR + i] = ray[RAY_TFAR + i]
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+@inlined
 def may_see(values: FloatArray, left: float, right: float, top: float, bottom: float) -> bool:
     """Return whether a rectangle of the picture may see the body."""
     return (

@@ -20,7 +20,7 @@ from aliasbench.renderers.raytrace.bodies import BODY_SIZE
 from aliasbench.renderers.raytrace.cutouts import is_hole, write_packet_alpha
 from aliasbench.renderers.raytrace.lanes import CAMERA_SIZE, RED, SCRATCH_SIZE
 from aliasbench.renderers.raytrace.paths import LIGHT_SIZE
-from aliasbench.renderers.raytrace.shading import TRIANGLE_SIZE, Tables
+from aliasbench.renderers.raytrace.shading import TRIANGLE_SIZE, EwaTables, Tables
 from aliasbench.renderers.raytrace.texturing import CUTOFF, OBJECT_SIZE
 from aliasbench.scenes.model import FloatArray
 
@@ -80,7 +80,7 @@ def _pointer(typing_context: Any, address: Any) -> Any:  # noqa: ARG001 - numba 
 @njit(cache=True, forceinline=True, error_model="numpy")
 def _tables(words: AddressArray, camera: FloatArray) -> Tables:
     """Return the tables that a context has the addresses of; lights and background are not among them."""
-    return Tables(
+    return EwaTables(
         carray(_pointer(words[_OBJECTS]), (words[_OBJECTS + 1], OBJECT_SIZE), np.float64),
         carray(_pointer(words[_OWNERS]), (words[_OWNERS + 1],), np.int32),
         carray(_pointer(words[_TRIANGLES]), (words[_TRIANGLES + 1], TRIANGLE_SIZE), np.float64),

@@ -23,7 +23,7 @@ def is_hole(tables: Tables, camera: FloatArray, hit: int, scratch: FloatArray, i
     if values[CUTOFF] == -np.inf:
         return False
     place_lane(tables, camera, hit, scratch, i)
-    return np.float32(alpha_lane(values, tables.levels, tables.texels, scratch, i)) < values[CUTOFF]
+    return np.float32(alpha_lane(tables, values, scratch, i)) < values[CUTOFF]
 
 
 @njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
@@ -39,7 +39,7 @@ def write_packet_alpha(tables: Tables, camera: FloatArray, hit: int, scratch: Fl
         place_along(tables.triangles[hit], scratch, LX)
     else:
         return False
-    alpha_packet(values, tables.levels, tables.texels, scratch)
+    alpha_packet(tables, values, scratch)
     return True
 
 

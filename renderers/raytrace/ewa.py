@@ -31,6 +31,7 @@ from numba import njit, types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
+from aliasbench.renderers.kernel_parts import inlined
 from aliasbench.scenes.model import FloatArray
 
 # The ratio of a footprint's axes up to which the average is sharp; past it the shorter axis counts as longer, as with
@@ -139,7 +140,7 @@ def ewa_color(
     return _average(texels, first, levels[level, 1], levels[level, 2], s, r, ss, sr, rr)
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+@inlined
 def _footprint_moments(
     x_s: float, x_r: float, y_s: float, y_r: float, width: int, height: int
 ) -> tuple[float, float, float, float, float]:
@@ -168,7 +169,7 @@ def _footprint_moments(
     return ss, sr, rr, least, most
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+@inlined
 def _average(
     texels: NDArray[np.float32], first: int, width: int, height: int,
     s: float, r: float, ss: float, sr: float, rr: float,
@@ -244,7 +245,7 @@ def footprint_axes(
     return s_x, r_x, s_y, r_y
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+@inlined
 def _moved(
     row: FloatArray, values: FloatArray, weight: float,
     qx: float, qy: float, qz: float, dx: float, dy: float, dz: float,

@@ -17,6 +17,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from aliasbench.renderers.kernel_parts import inlined
 from aliasbench.renderers.raytrace.lanes import BLUE, GREEN, LANES, LOD, PX, PY, RED, SIGN
 from aliasbench.renderers.raytrace.positions import (
     ALL,
@@ -102,7 +103,7 @@ class Film(NamedTuple):
     warp: Warp
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+@inlined
 def next_runs(film: Film, r: int, cursor: IntArray, runs: IntArray) -> tuple[int, int]:
     """Return how many lanes and how many runs the next packet of a row has, 0 and 0 at its end; write `runs`.
 
@@ -128,13 +129,13 @@ def next_runs(film: Film, r: int, cursor: IntArray, runs: IntArray) -> tuple[int
     return lane, count
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+@inlined
 def is_even(pattern: Pattern, film: Film) -> bool:
     """Return whether `place_even` and `add_even` can serve, which do the same as the functions for runs, but faster."""
     return film.each > 0 and film.warp.code == IDENTITY and pattern.sampler == SOBOL and pattern.samples <= SHORT
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+@inlined
 def place_even(film: Film, keys: KeyArray, r: int, first: int, room: FloatArray, scratch: FloatArray) -> None:
     """Write the image positions of a packet from a row's sample number `first` on, every pixel taking `film.each`.
 
@@ -148,7 +149,7 @@ def place_even(film: Film, keys: KeyArray, r: int, first: int, room: FloatArray,
         scratch[PY + i] = film.spread * (scratch[PY + i] - 0.5) + y
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+@inlined
 def add_even(film: Film, r: int, first: int, lanes: int, scratch: FloatArray) -> None:
     """Write the sums of a packet's pixels to the film, every pixel taking `film.each` samples."""
     each = film.each
@@ -161,7 +162,7 @@ def add_even(film: Film, r: int, first: int, lanes: int, scratch: FloatArray) ->
         _add_first(film, r, first // each + p, each * p, each, scratch)
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+@inlined
 def _add_first(film: Film, r: int, k: int, lane: int, length: int, scratch: FloatArray) -> None:
     """Write what `_sum_run` adds, of a pixel that it has added nothing to."""
     for c in range(3):
@@ -175,7 +176,7 @@ def _add_first(film: Film, r: int, k: int, lane: int, length: int, scratch: Floa
         film.shifts[r, k, c], film.sums[r, k, c], film.squares[r, k, c] = shift, total, square
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+@inlined
 def run_address(pattern: Pattern, film: Film, keys: KeyArray, r: int, run: IntArray) -> tuple[np.uint64, int, int]:
     """Return the key, the size of the set, and the number in it, of a run's first sample.
 
@@ -191,7 +192,7 @@ def run_address(pattern: Pattern, film: Film, keys: KeyArray, r: int, run: IntAr
     return key, film.ends[r, k] - begin, index - begin
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+@inlined
 def place_runs(
     pattern: Pattern, film: Film, keys: KeyArray, r: int, runs: IntArray, count: int, orders: NDArray[np.int32],
     scratch: FloatArray,
@@ -234,7 +235,7 @@ def place_runs(
         scratch[PY + i] += row + 0.5
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+@inlined
 def add_runs(
     film: Film, r: int, runs: IntArray, count: int, weights: FloatArray, taps: FloatArray, room: FloatArray,
     scratch: FloatArray,
@@ -271,14 +272,14 @@ def add_runs(
             _splat_pixel(film, r, k, taps)
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+@inlined
 def _clear(taps: FloatArray) -> None:
     values = taps.reshape(taps.size)
     for k in range(len(values)):
         values[k] = 0.0
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+@inlined
 def _sum_run(film: Film, r: int, run: IntArray, scratch: FloatArray) -> None:
     k, lane, length = run[RUN_PIXEL], run[RUN_LANE], run[RUN_LANES]
     if film.shifts.shape[0] == 0:
@@ -321,7 +322,7 @@ def _sum_run(film: Film, r: int, run: IntArray, scratch: FloatArray) -> None:
             film.squares[r, k, c] += square
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+@inlined
 def _weigh_runs(
     film: Film, r: int, runs: IntArray, count: int, weights: FloatArray, room: FloatArray, scratch: FloatArray
 ) -> None:
@@ -336,7 +337,7 @@ def _weigh_runs(
     weigh_lanes(film.profile, 0.5 * film.spread, film.radius, film.least, scratch, PX, weights, room)
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+@inlined
 def _tap_lanes(margin: int, lane: int, length: int, weights: FloatArray, taps: FloatArray, scratch: FloatArray) -> None:
     for i in range(lane, lane + length):
         red, green, blue = scratch[RED + i], scratch[GREEN + i], scratch[BLUE + i]
@@ -370,7 +371,7 @@ def _tap_radial(film: Film, r: int, run: IntArray, taps: FloatArray, scratch: Fl
                 taps[j, k, 3] += w
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+@inlined
 def _splat_pixel(film: Film, r: int, k: int, taps: FloatArray) -> None:
     """Add a pixel's taps to the row's buffers; what falls outside of the image is dropped."""
     scale, width = film.scales[r, k], film.splats.shape[2]

@@ -15,6 +15,7 @@ from numba import njit, types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
+from aliasbench.renderers.kernel_parts import called, inlined
 from aliasbench.renderers.raytrace.blurs import fill_film_lens, fill_film_times, picture_reach
 from aliasbench.renderers.raytrace.bodies import fill_body_rays, may_see, to_body
 from aliasbench.renderers.raytrace.embree import library_path, load_library
@@ -110,7 +111,7 @@ class Workspace(NamedTuple):
     holes: CountArray
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+@inlined
 def trace(scene: int, work: Workspace, lanes: int) -> None:
     """Find the nearest hits on the mesh that stands still, MISS where there is none."""
     # One array a loop: with more, the compiler must tell their ranges apart first, for a nanosecond a sample.
@@ -124,7 +125,7 @@ def trace(scene: int, work: Workspace, lanes: int) -> None:
         intersect16(work.valid.ctypes.data, scene, work.ray.ctypes.data, work.arguments.ctypes.data)
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+@inlined
 def trace_bodies(
     scenes: CountArray, tables: Tables, work: Workspace, left: float, right: float, top: float, bottom: float
 ) -> None:
@@ -145,7 +146,7 @@ def trace_bodies(
                 work.ray[RAY_TFAR + i] = work.body_ray[RAY_TFAR + i]
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@called
 def _trace_block(
     scene: int, scenes: CountArray, camera: FloatArray, tables: Tables, work: Workspace, count: int, textured: bool
 ) -> None:

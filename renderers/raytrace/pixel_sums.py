@@ -1,14 +1,14 @@
 """Sums of a row of pixels under the box filter, the way most pictures are made: each sample counts in its own pixel."""
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from aliasbench.renderers.kernel_parts import inlined
 from aliasbench.renderers.raytrace.lanes import BLUE, GREEN, LANES, RED
 from aliasbench.scenes.model import FloatArray
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+@inlined
 def add_samples(
     samples: int, row: int, first: int, lanes: int, scratch: FloatArray, sums: FloatArray, out: NDArray[np.float32]
 ) -> None:
@@ -42,7 +42,7 @@ def add_samples(
         column, index = column + 1, 0
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+@inlined
 def _write_pixel(samples: int, row: int, column: int, sums: FloatArray, out: NDArray[np.float32]) -> None:
     """Write the mean of a pixel's samples, and start the sums of the next."""
     for k in range(3):

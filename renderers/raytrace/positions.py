@@ -12,10 +12,14 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from aliasbench.renderers.kernel_parts import called, inlined
 from aliasbench.renderers.raytrace.lanes import LANES, LOD, PX, PY, TIME, U, V
 from aliasbench.renderers.sampling.bits import and32
 from aliasbench.renderers.sampling.hashing import SHARED, combine, permute_power, unit
 from aliasbench.renderers.sampling.patterns import (
+    AXIS_0,
+    AXIS_1,
+    AXIS_2,
     BLUENOISE,
     CENTER,
     DIM_TIME,
@@ -36,6 +40,7 @@ from aliasbench.renderers.sampling.patterns import (
     sequence_point,
     stream_keys,
 )
+from aliasbench.renderers.sampling.rare import compiled_if_rare
 from aliasbench.renderers.sampling.sobol import TABLE_BITS, scrambled_unit, shuffled
 from aliasbench.scenes.model import FloatArray
 
@@ -83,7 +88,7 @@ def orders_size(pattern: Pattern) -> int:
     return max(row_count(pattern.samples), pattern.samples // row_count(pattern.samples) + 1)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@called
 def _fill_orders(pattern: Pattern, first: int, second: int, orders: NDArray[np.int32]) -> None:
     """Write one pixel's orders of multijittered rows, and of columns in rows of the two lengths."""
     rows = row_count(pattern.samples)
@@ -95,32 +100,39 @@ def _fill_orders(pattern: Pattern, first: int, second: int, orders: NDArray[np.i
             orders[1 + longer, k] = column_order(k, shortest + longer, second)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
-def _fill_rare(
+@compiled_if_rare(None)
+@called
+def _fill_multijittered(
     pattern: Pattern, first: int, second: int, index: int, lane: int, run: int, left: float, top: float,
     orders: NDArray[np.int32], scratch: FloatArray,
 ) -> None:  # fmt: skip
-    """Do what `fill_run` does, for the samplers that are not worth being compiled into every kernel."""
-    if pattern.sampler == MULTIJITTERED:
-        if index == 0:
-            _fill_orders(pattern, first, second, orders)
-        rows = row_count(pattern.samples)
-        shortest = pattern.samples // rows
-        for k in range(run):
-            i = (index + k) & INDEX_MASK
-            column, longer = pattern.places[1, i], pattern.places[2, i]
-            u = (orders[0, pattern.places[0, i]] + unit(first, i)) / rows
-            v = (orders[1 + longer, column] + unit(second, i)) / (shortest + longer)
-            scratch[PX + lane + k] = left + (pattern.cells[0, i] + pattern.cells[2, i] * u)
-            scratch[PY + lane + k] = top + (pattern.cells[1, i] + pattern.cells[3, i] * v)
-        return
+    """Do what `fill_run` does."""
+    if index == 0:
+        _fill_orders(pattern, first, second, orders)
+    rows = row_count(pattern.samples)
+    shortest = pattern.samples // rows
     for k in range(run):
-        scratch[PX + lane + k] = left + sequence_point(pattern, 0, index + k, first)
-    for k in range(run):
-        scratch[PY + lane + k] = top + sequence_point(pattern, 1, index + k, second)
+        i = (index + k) & INDEX_MASK
+        column, longer = pattern.places[1, i], pattern.places[2, i]
+        u = (orders[0, pattern.places[0, i]] + unit(first, i)) / rows
+        v = (orders[1 + longer, column] + unit(second, i)) / (shortest + longer)
+        scratch[PX + lane + k] = left + (pattern.cells[0, i] + pattern.cells[2, i] * u)
+        scratch[PY + lane + k] = top + (pattern.cells[1, i] + pattern.cells[3, i] * v)
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+@called
+def _fill_long(
+    pattern: Pattern, first: int, second: int, index: int, lane: int, run: int, left: float, top: float,
+    scratch: FloatArray,
+) -> None:  # fmt: skip
+    """Do what `fill_run` does, for any part of any sequence."""
+    for k in range(run):
+        scratch[PX + lane + k] = left + sequence_point(pattern, AXIS_0, index + k, first)
+    for k in range(run):
+        scratch[PY + lane + k] = top + sequence_point(pattern, AXIS_1, index + k, second)
+
+
+@inlined
 def fill_run(
     pattern: Pattern, keys: KeyArray, place: int, index: int, lane: int, run: int, left: float, top: float,
     orders: NDArray[np.int32], scratch: FloatArray,
@@ -138,8 +150,11 @@ def fill_run(
             scratch[PY + lane + k] = top + pattern.cells[1, i]
         return
     first, second = keys[FIRST, place], keys[SECOND, place]
-    if sampler in (MULTIJITTERED, BLUENOISE) or (sampler == SOBOL and index + run > SHORT):
-        _fill_rare(pattern, first, second, index, lane, run, left, top, orders, scratch)
+    if sampler == MULTIJITTERED:
+        _fill_multijittered(pattern, first, second, index, lane, run, left, top, orders, scratch)
+        return
+    if sampler == BLUENOISE or (sampler == SOBOL and index + run > SHORT):
+        _fill_long(pattern, first, second, index, lane, run, left, top, scratch)
         return
     if sampler == SOBOL:
         key_x, key_y = np.uint32(first), np.uint32(second)
@@ -158,7 +173,7 @@ def fill_run(
         scratch[PY + lane + k] = top + (pattern.cells[1, i] + pattern.cells[3, i] * unit(second, i))
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+@inlined
 def fill_mixed(pattern: Pattern, keys: KeyArray, runs: NDArray[np.int64], count: int, scratch: FloatArray) -> None:
     """Write places in their pixels of several pixels' samples at once, of Sobol's sequence up to number SHORT.
 
@@ -178,7 +193,7 @@ def fill_mixed(pattern: Pattern, keys: KeyArray, runs: NDArray[np.int64], count:
         scratch[PY + i] = scrambled_unit(word, np.uint32(scratch[V + i]))
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@called
 def start_even(pattern: Pattern, each: int, room: FloatArray) -> None:
     """Write to `room` (2, LANES or more) what all packets of `fill_even` share: points before they are scrambled."""
     for dimension in range(2):
@@ -186,7 +201,7 @@ def start_even(pattern: Pattern, each: int, room: FloatArray) -> None:
             room[dimension, i] = float(pattern.tables[0, dimension, i & (each - 1)])
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+@inlined
 def fill_even(
     keys: KeyArray, each: int, column: int, last: int, left: float, room: FloatArray, scratch: FloatArray
 ) -> None:
@@ -205,7 +220,7 @@ def fill_even(
         scratch[PY + i] = scrambled_unit(np.uint32(np.int64(room[1, i])), np.uint32(np.int64(scratch[V + i])))
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+@inlined
 def _spread_keys(keys: KeyArray, each: int, column: int, last: int, left: float, scratch: FloatArray) -> None:
     for n in range(LANES // each):
         k = min(column + n, last)
@@ -214,7 +229,7 @@ def _spread_keys(keys: KeyArray, each: int, column: int, last: int, left: float,
             scratch[U + i], scratch[V + i], scratch[LOD + i] = key_x, key_y, x
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+@inlined
 def fill_positions(
     pattern: Pattern, keys: KeyArray, row: int, first: int, lanes: int, orders: NDArray[np.int32], scratch: FloatArray
 ) -> None:
@@ -233,7 +248,7 @@ def fill_positions(
         column, index = column + 1, 0
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+@inlined
 def _fill_numbers(
     pattern: Pattern, count: int, index: int, lane: int, run: int, order: int, numbers: NDArray[np.int64]
 ) -> None:
@@ -272,7 +287,7 @@ def fill_line(
         _fill_line(pattern, count, stream, order, dimension, index, lane, run, numbers, scratch, at)
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+@inlined
 def _fill_line(
     pattern: Pattern, count: int, stream: int, order: int, dimension: int, index: int, lane: int, run: int,
     numbers: NDArray[np.int64], scratch: FloatArray, at: int,
@@ -284,12 +299,12 @@ def _fill_line(
         return
     if sampler == SOBOL and dimension == DIM_TIME:
         for k in range(run):
-            scratch[at + lane + k] = sequence_point(pattern, 2, index + k, stream)
+            scratch[at + lane + k] = sequence_point(pattern, AXIS_2, index + k, stream)
         return
     _fill_numbers(pattern, count, index, lane, run, order, numbers)
     if sampler >= SOBOL:
         for k in range(run):
-            scratch[at + lane + k] = sequence_point(pattern, 0, numbers[lane + k], stream)
+            scratch[at + lane + k] = sequence_point(pattern, AXIS_0, numbers[lane + k], stream)
     elif sampler in (CENTER, GRID):
         for k in range(run):
             scratch[at + lane + k] = (numbers[lane + k] + 0.5) / count
@@ -316,7 +331,7 @@ def fill_plane(
         _fill_plane(pattern, count, first, second, order, index, step, lane, run, numbers, scratch, at_u, at_v)
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+@inlined
 def _fill_plane(
     pattern: Pattern, count: int, first: int, second: int, order: int, index: int, step: int, lane: int, run: int,
     numbers: NDArray[np.int64], scratch: FloatArray, at_u: int, at_v: int,
@@ -328,9 +343,9 @@ def _fill_plane(
             numbers[lane + k] = own_order(pattern, count, index + k * step, order)
     if pattern.sampler >= SOBOL:
         for k in range(run):
-            scratch[at_u + lane + k] = sequence_point(pattern, 0, numbers[lane + k], first)
+            scratch[at_u + lane + k] = sequence_point(pattern, AXIS_0, numbers[lane + k], first)
         for k in range(run):
-            scratch[at_v + lane + k] = sequence_point(pattern, 1, numbers[lane + k], second)
+            scratch[at_v + lane + k] = sequence_point(pattern, AXIS_1, numbers[lane + k], second)
         return
     rows = row_count(count)
     for k in range(run):

@@ -9,9 +9,9 @@ same to the last bit.
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from aliasbench.renderers.kernel_parts import inlined
 from aliasbench.renderers.raytrace.lanes import BLUE, GREEN, LANES, LENS_X, LENS_Y, PX, PY, RED, SIGN, TIME
 from aliasbench.scenes.model import FloatArray
 
@@ -40,7 +40,7 @@ def make_block() -> Block:
     )
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+@inlined
 def put_packet(block: Block, packet: int, scratch: FloatArray) -> None:
     """Keep a packet's places, times, lens points and signs."""
     at = packet * LANES
@@ -50,7 +50,7 @@ def put_packet(block: Block, packet: int, scratch: FloatArray) -> None:
         block.places[4, at + i], block.places[5, at + i] = scratch[LENS_Y + i], scratch[SIGN + i]
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+@inlined
 def sort_block(block: Block, count: int, lens_radius: float) -> None:
     """Write the numbers of the first `count` samples in the order of time, to a part in 64 of the shutter.
 
@@ -69,7 +69,7 @@ def sort_block(block: Block, count: int, lens_radius: float) -> None:
         ends[b] += 1
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+@inlined
 def _bucket(block: Block, k: int, lens_radius: float) -> int:
     if lens_radius == 0.0:
         return int(block.places[2, k] * _BUCKETS) & (_BUCKETS - 1)
@@ -78,7 +78,7 @@ def _bucket(block: Block, k: int, lens_radius: float) -> int:
     return (int((block.places[4, k] + lens_radius) * scale) * _SIDE + across) & (_BUCKETS - 1)
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+@inlined
 def take_sorted(block: Block, packet: int, lanes: int, scratch: FloatArray) -> None:
     """Write the places of a packet in the order of time; lanes without a sample repeat the last one."""
     for i in range(LANES):
@@ -88,7 +88,7 @@ def take_sorted(block: Block, packet: int, lanes: int, scratch: FloatArray) -> N
         scratch[LENS_Y + i] = block.places[4, k]
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+@inlined
 def keep_colors(block: Block, packet: int, lanes: int, scratch: FloatArray) -> None:
     """Keep the colours of a packet in the order of time."""
     for i in range(lanes):
@@ -97,7 +97,7 @@ def keep_colors(block: Block, packet: int, lanes: int, scratch: FloatArray) -> N
         block.colors[2, k] = scratch[BLUE + i]
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+@inlined
 def restore_packet(block: Block, packet: int, scratch: FloatArray) -> None:
     """Write a packet's places, signs and colours in their first order."""
     at = packet * LANES

@@ -13,6 +13,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from aliasbench.renderers.kernel_parts import called, inlined
 from aliasbench.renderers.raytrace.bodies import lane_to_body
 from aliasbench.renderers.raytrace.ewa import footprint_axes
 from aliasbench.renderers.raytrace.lane_bits import ALL_LANES, equal_lanes, lowest_bit
@@ -57,6 +58,7 @@ from aliasbench.renderers.raytrace.texturing import (
     shade_lane,
     shade_packet,
 )
+from aliasbench.renderers.sampling.rare import compiled_if_rare
 from aliasbench.scenes.model import FloatArray
 
 MISS = -1
@@ -102,7 +104,14 @@ class Tables(NamedTuple):
     footprint: float
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+class EwaTables(Tables):
+    """Tables of objects whose textures are averaged over ellipses, which other kernels do without (`sampling.rare`)."""
+
+    __slots__ = ()
+    RARE = True
+
+
+@inlined
 def shade_flat(tables: Tables, hits: NDArray[np.int32], scratch: FloatArray) -> None:
     """Write the colours of hits on objects without textures."""
     first = hits[0]
@@ -123,7 +132,7 @@ def shade_flat(tables: Tables, hits: NDArray[np.int32], scratch: FloatArray) -> 
         scratch[BLUE + i] = b if seen else blue
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+@inlined
 def shade_textured(tables: Tables, camera: FloatArray, hits: NDArray[np.int32], scratch: FloatArray) -> None:
     """Write the colours of hits on any objects."""
     first = hits[0]
@@ -141,17 +150,17 @@ def shade_textured(tables: Tables, camera: FloatArray, hits: NDArray[np.int32], 
         if owner == MISS:
             owner = _place_lanes(tables, camera, hits, scratch)
     if owner != MISS and tables.objects[owner, KIND] != PLAIN:
-        shade_packet(tables.objects, owner, tables.levels, tables.texels, scratch)
+        shade_packet(tables, owner, scratch)
         return
     for i in range(LANES):
         hit = hits[i]
         if hit == MISS or tables.objects[tables.owners[hit], KIND] == PLAIN:
             _paint_lane(tables, hit, scratch, i)
         else:
-            shade_lane(tables.objects, tables.owners[hit], tables.levels, tables.texels, scratch, i)
+            shade_lane(tables, tables.owners[hit], scratch, i)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@called
 def _place_lanes(tables: Tables, camera: FloatArray, hits: NDArray[np.int32], scratch: FloatArray) -> int:
     """Write texture coordinates, and levels of detail where needed, of any hits; return their object, or MISS."""
     owner = np.int64(tables.owners[hits[0]] if hits[0] != MISS else MISS)
@@ -167,7 +176,7 @@ def _place_lanes(tables: Tables, camera: FloatArray, hits: NDArray[np.int32], sc
     return int(owner)
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+@inlined
 def _place_triangles(tables: Tables, hits: NDArray[np.int32], scratch: FloatArray) -> int:
     """Write texture coordinates of hits on triangles of one object that stands still, triangle by triangle.
 
@@ -202,7 +211,7 @@ def _place_triangles(tables: Tables, hits: NDArray[np.int32], scratch: FloatArra
         lane = lowest_bit(todo)
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+@inlined
 def _paint_plain(tables: Tables, hit: int, scratch: FloatArray) -> None:
     if hit == MISS:
         r, g, b = tables.background[0], tables.background[1], tables.background[2]
@@ -213,7 +222,7 @@ def _paint_plain(tables: Tables, hit: int, scratch: FloatArray) -> None:
         scratch[RED + i], scratch[GREEN + i], scratch[BLUE + i] = r, g, b
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+@inlined
 def _paint_lane(tables: Tables, hit: int, scratch: FloatArray, i: int) -> None:
     if hit == MISS:
         for k in range(3):
@@ -224,7 +233,7 @@ def _paint_lane(tables: Tables, hit: int, scratch: FloatArray, i: int) -> None:
             scratch[RED + k * LANES + i] = tables.objects[owner, COLOR + k]
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+@inlined
 def _place(
     row: FloatArray, scratch: FloatArray, i: int, ox: float, oy: float, oz: float, dx: float, dy: float, dz: float
 ) -> float:
@@ -236,7 +245,7 @@ def _place(
     return t
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+@inlined
 def _stretch(
     row: FloatArray, values: FloatArray, width: float, height: float, weight: float,
     qx: float, qy: float, qz: float, dx: float, dy: float, dz: float,
@@ -251,6 +260,7 @@ def _stretch(
     return s * s + r * r
 
 
+# With the rows known before it is optimised, which `inlined` would not do: 4 % of a picture's time.
 @njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
 def place_along(row: FloatArray, scratch: FloatArray, rays: int) -> None:
     """Write where 16 rays, in six rows of `scratch` from `rays` on, meet one triangle's plane, as `_place` does."""
@@ -269,7 +279,19 @@ def place_along(row: FloatArray, scratch: FloatArray, rays: int) -> None:
         scratch[DISTANCE + i] = t
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+@compiled_if_rare(None)
+@inlined
+def _write_axes(
+    tables: Tables, row: FloatArray, values: FloatArray, scratch: FloatArray, i: int, weight: float,  # noqa: ARG001
+    rx: float, ry: float, rz: float, ux: float, uy: float, uz: float, dx: float, dy: float, dz: float,
+) -> None:  # fmt: skip
+    """Write how texture coordinates move along a lane's footprint."""
+    scratch[S_RIGHT + i], scratch[R_RIGHT + i], scratch[S_UP + i], scratch[R_UP + i] = footprint_axes(
+        row, values, weight, rx, ry, rz, ux, uy, uz, dx, dy, dz
+    )
+
+
+@inlined
 def place_packet(tables: Tables, camera: FloatArray, hit: int, scratch: FloatArray) -> None:
     """Write texture coordinates, and levels of detail where needed, of 16 hits on one triangle that stands still.
 
@@ -290,9 +312,7 @@ def place_packet(tables: Tables, camera: FloatArray, hit: int, scratch: FloatArr
         for i in range(LANES):
             weight = step * (1.0 + perspective * (scratch[DISTANCE + i] - 1.0))
             dx, dy, dz = scratch[DX + i], scratch[DY + i], scratch[DZ + i]
-            scratch[S_RIGHT + i], scratch[R_RIGHT + i], scratch[S_UP + i], scratch[R_UP + i] = footprint_axes(
-                row, values, weight, rx, ry, rz, ux, uy, uz, dx, dy, dz
-            )
+            _write_axes(tables, row, values, scratch, i, weight, rx, ry, rz, ux, uy, uz, dx, dy, dz)
         return
     level = int(values[LEVEL])
     width, height = float(tables.levels[level, 1]), float(tables.levels[level, 2])
@@ -306,7 +326,7 @@ def place_packet(tables: Tables, camera: FloatArray, hit: int, scratch: FloatArr
         scratch[LOD + i] = 0.5 * np.log2(max(scratch[LOD + i], 1e-300))
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+@inlined
 def place_lane(tables: Tables, camera: FloatArray, hit: int, scratch: FloatArray, i: int) -> None:
     """Write texture coordinates, and the level of detail where needed, of one hit on anything (see `place_packet`)."""
     row = tables.triangles[hit]
@@ -331,9 +351,7 @@ def place_lane(tables: Tables, camera: FloatArray, hit: int, scratch: FloatArray
         rx, ry, rz = _direction_to_body(tables.bodies[body], scratch, i, rx, ry, rz)
         ux, uy, uz = _direction_to_body(tables.bodies[body], scratch, i, ux, uy, uz)
     if values[KIND] == EWA:
-        scratch[S_RIGHT + i], scratch[R_RIGHT + i], scratch[S_UP + i], scratch[R_UP + i] = footprint_axes(
-            row, values, weight, rx, ry, rz, ux, uy, uz, dx, dy, dz
-        )
+        _write_axes(tables, row, values, scratch, i, weight, rx, ry, rz, ux, uy, uz, dx, dy, dz)
         return
     level = int(values[LEVEL])
     width, height = float(tables.levels[level, 1]), float(tables.levels[level, 2])
@@ -342,7 +360,7 @@ def place_lane(tables: Tables, camera: FloatArray, hit: int, scratch: FloatArray
     scratch[LOD + i] = 0.5 * np.log2(max(across, down, 1e-300))
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@called
 def _direction_to_body(
     values: FloatArray, scratch: FloatArray, i: int, x: float, y: float, z: float
 ) -> tuple[float, float, float]:
@@ -354,7 +372,7 @@ def _direction_to_body(
     return scratch[MX + i], scratch[MY + i], scratch[MZ + i]
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@called
 def meet_plane(tables: Tables, hit: int, scratch: FloatArray, i: int) -> tuple[float, float, float, float]:
     """Return the ray parameter at which lane i meets a triangle's plane, and the plane's normal, of any length.
 

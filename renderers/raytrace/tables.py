@@ -35,6 +35,7 @@ from aliasbench.renderers.raytrace.shading import (
     U_SHIFT,
     V_MAP,
     V_SHIFT,
+    EwaTables,
     Tables,
 )
 from aliasbench.renderers.raytrace.texturing import (
@@ -260,7 +261,8 @@ def build_tables(
     `bodies` (b, BODY_SIZE) are those that move, `lights` as `lighting.light_values` has them.
     """
     still_only = not moving.owners.size
-    return Tables(
+    kind = EwaTables if (looks.objects[:, KIND] == EWA).any() else Tables
+    return kind(
         looks.objects,
         still.owners if still_only else np.concatenate([still.owners, moving.owners]),
         still.values if still_only else np.concatenate([still.values, moving.values]),

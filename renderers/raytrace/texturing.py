@@ -3,14 +3,20 @@
 The formulas of `scenes.textures` and of OpenGL, for 16 lanes at once where all are of one object, or lane by lane.
 """
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from aliasbench.renderers.kernel_parts import called, inlined
 from aliasbench.renderers.raytrace.ewa import ewa_color
 from aliasbench.renderers.raytrace.lanes import BLUE, GREEN, LANES, LOD, R_RIGHT, R_UP, RED, S_RIGHT, S_UP, U, V
 from aliasbench.renderers.raytrace.trig import cos_turns
+from aliasbench.renderers.sampling.rare import compiled_if_rare
 from aliasbench.scenes.model import FloatArray
+
+if TYPE_CHECKING:
+    from aliasbench.renderers.raytrace.shading import Tables
 
 # Values of an object: colour, kind of texture, what that kind needs, below which alpha it is absent (-inf: none), and
 # how it answers light (`paths`).
@@ -23,24 +29,24 @@ IndexArray = NDArray[np.int64]
 TexelArray = NDArray[np.float32]
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+@inlined
 def _checker_share(u: float, v: float, across: float, up: float) -> float:
     count = np.floor(u * across) + np.floor(v * up)
     return count - 2.0 * np.floor(count * 0.5)
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+@inlined
 def _wave(u: float, v: float, across: float, up: float, phase: float) -> float:
     return cos_turns(u * across + v * up + phase)
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+@inlined
 def _rings(u: float, v: float, center_u: float, center_v: float, rate: float, phase: float) -> float:
     x, y = u - center_u, v - center_v
     return cos_turns((x * x + y * y) * rate + phase)
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+@inlined
 def _blend(
     scratch: FloatArray, i: int, share: float,
     red: float, green: float, blue: float, to_red: float, to_green: float, to_blue: float,
@@ -50,10 +56,10 @@ def _blend(
     scratch[BLUE + i] = blue + share * to_blue
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
-def shade_packet(objects: FloatArray, owner: int, levels: IndexArray, texels: TexelArray, scratch: FloatArray) -> None:
+@inlined
+def shade_packet(tables: "Tables", owner: int, scratch: FloatArray) -> None:
     """Write the colours of 16 hits on one object, from their texture coordinates and levels of detail."""
-    values = objects[owner]
+    values = tables.objects[owner]
     kind = values[KIND]
     # Read before the loops: the compiler cannot know that writing colours leaves them as they are.
     first, second, phase, rate = values[PLACE], values[PLACE + 1], values[PHASE], values[RATE]
@@ -85,18 +91,16 @@ def shade_packet(objects: FloatArray, owner: int, levels: IndexArray, texels: Te
             _blend(scratch, i, share, red, green, blue, to_red, to_green, to_blue)
     else:
         for i in range(LANES):
-            _look_up(values, levels, texels, scratch, i)
+            _look_up(tables, values, scratch, i)
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
-def shade_lane(
-    objects: FloatArray, owner: int, levels: IndexArray, texels: TexelArray, scratch: FloatArray, i: int
-) -> None:
+@inlined
+def shade_lane(tables: "Tables", owner: int, scratch: FloatArray, i: int) -> None:
     """Write the colour of one hit, from its texture coordinates and level of detail."""
-    values = objects[owner]
+    values = tables.objects[owner]
     kind = values[KIND]
     if kind >= NEAREST:
-        _look_up(values, levels, texels, scratch, i)
+        _look_up(tables, values, scratch, i)
         return
     u, v = scratch[U + i], scratch[V + i]
     first, second, phase = values[PLACE], values[PLACE + 1], values[PHASE]
@@ -116,7 +120,7 @@ def shade_lane(
         )
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+@inlined
 def _own_place(values: FloatArray, scratch: FloatArray, i: int) -> tuple[float, float]:
     """Return where a lane's texture coordinates lie in those of the mip chain."""
     u, v = scratch[U + i], scratch[V + i]
@@ -126,13 +130,13 @@ def _own_place(values: FloatArray, scratch: FloatArray, i: int) -> tuple[float, 
     )
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+@inlined
 def _nearest(first: int, width: int, height: int, s: float, r: float) -> int:
     """Return the texel that holds a place, on the level that has its first texel there and this size."""
     return first + _wrap(np.floor(r * height), height) * width + _wrap(np.floor(s * width), width)
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+@inlined
 def _level_of(values: FloatArray, scratch: FloatArray, i: int) -> tuple[int, float]:
     """Return the level that a lane is looked up in, and the share of the one above."""
     lod = min(max(scratch[LOD + i], 0.0), values[LEVELS] - 1.0)
@@ -145,20 +149,22 @@ def _level_of(values: FloatArray, scratch: FloatArray, i: int) -> tuple[int, flo
     return int(values[LEVEL]) + int(level), part
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+@compiled_if_rare((0.0, 0.0, 0.0, 0.0))
+@inlined
 def _ewa(
-    values: FloatArray, levels: IndexArray, texels: TexelArray, scratch: FloatArray, i: int, s: float, r: float
+    tables: "Tables", values: FloatArray, scratch: FloatArray, i: int, s: float, r: float
 ) -> tuple[float, float, float, float]:
     """Return the colour and alpha of an image averaged over a lane's footprint."""
     return ewa_color(
-        levels, texels, int(values[LEVEL]), int(values[LEVELS]), s, r,
+        tables.levels, tables.texels, int(values[LEVEL]), int(values[LEVELS]), s, r,
         scratch[S_RIGHT + i], scratch[R_RIGHT + i], scratch[S_UP + i], scratch[R_UP + i],
     )  # fmt: skip
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
-def _look_up(values: FloatArray, levels: IndexArray, texels: TexelArray, scratch: FloatArray, i: int) -> None:
+@inlined
+def _look_up(tables: "Tables", values: FloatArray, scratch: FloatArray, i: int) -> None:
     """Write the colour of an image (or baked chain) from one level or between two."""
+    levels, texels = tables.levels, tables.texels
     s, r = _own_place(values, scratch, i)
     if values[KIND] == NEAREST:
         level = levels[int(values[LEVEL])]
@@ -167,7 +173,7 @@ def _look_up(values: FloatArray, levels: IndexArray, texels: TexelArray, scratch
             scratch[RED + k * LANES + i] = values[COLOR + k] * texels[texel, k]
         return
     if values[KIND] == EWA:
-        red, green, blue, _ = _ewa(values, levels, texels, scratch, i, s, r)
+        red, green, blue, _ = _ewa(tables, values, scratch, i, s, r)
         scratch[RED + i] = values[COLOR] * red
         scratch[RED + LANES + i] = values[COLOR + 1] * green
         scratch[RED + 2 * LANES + i] = values[COLOR + 2] * blue
@@ -184,9 +190,10 @@ def _look_up(values: FloatArray, levels: IndexArray, texels: TexelArray, scratch
     scratch[RED + 2 * LANES + i] = values[COLOR + 2] * blue
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
-def alpha_packet(values: FloatArray, levels: IndexArray, texels: TexelArray, scratch: FloatArray) -> None:
+@inlined
+def alpha_packet(tables: "Tables", values: FloatArray, scratch: FloatArray) -> None:
     """Write the alpha of 16 hits on one image where their red goes."""
+    levels, texels = tables.levels, tables.texels
     if values[KIND] == NEAREST:
         # Read before the loop: the compiler cannot know that writing alphas leaves them as they are.
         level = levels[int(values[LEVEL])]
@@ -199,18 +206,19 @@ def alpha_packet(values: FloatArray, levels: IndexArray, texels: TexelArray, scr
             scratch[RED + i] = texels[texel, 3]
         return
     for i in range(LANES):
-        scratch[RED + i] = alpha_lane(values, levels, texels, scratch, i)
+        scratch[RED + i] = alpha_lane(tables, values, scratch, i)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
-def alpha_lane(values: FloatArray, levels: IndexArray, texels: TexelArray, scratch: FloatArray, i: int) -> float:
+@called
+def alpha_lane(tables: "Tables", values: FloatArray, scratch: FloatArray, i: int) -> float:
     """Return the alpha of an image at a hit, looked up as `_look_up` does the colour."""
+    levels, texels = tables.levels, tables.texels
     s, r = _own_place(values, scratch, i)
     if values[KIND] == NEAREST:
         level = levels[int(values[LEVEL])]
         return texels[_nearest(level[0], level[1], level[2], s, r), 3]
     if values[KIND] == EWA:
-        return _ewa(values, levels, texels, scratch, i, s, r)[3]
+        return _ewa(tables, values, scratch, i, s, r)[3]
     at, part = _level_of(values, scratch, i)
     alpha = _bilinear_alpha(levels, texels, at, s, r)
     if part > 0.0:
@@ -218,7 +226,7 @@ def alpha_lane(values: FloatArray, levels: IndexArray, texels: TexelArray, scrat
     return alpha
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+@inlined
 def _four_texels(
     levels: IndexArray, level: int, s: float, r: float
 ) -> tuple[int, int, int, int, float, float, float, float]:
@@ -237,7 +245,7 @@ def _four_texels(
     )  # fmt: skip
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+@inlined
 def _bilinear(levels: IndexArray, texels: TexelArray, level: int, s: float, r: float) -> tuple[float, float, float]:
     c00, c10, c01, c11, w00, w10, w01, w11 = _four_texels(levels, level, s, r)
     return (
@@ -247,13 +255,13 @@ def _bilinear(levels: IndexArray, texels: TexelArray, level: int, s: float, r: f
     )
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+@inlined
 def _bilinear_alpha(levels: IndexArray, texels: TexelArray, level: int, s: float, r: float) -> float:
     c00, c10, c01, c11, w00, w10, w01, w11 = _four_texels(levels, level, s, r)
     return w00 * texels[c00, 3] + w10 * texels[c10, 3] + w01 * texels[c01, 3] + w11 * texels[c11, 3]
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
+@inlined
 def _wrap(index: float, size: int) -> int:
     """Return a texel index taken into range(size); in float64, which holds every index that means anything."""
     wrapped = int(index - size * np.floor(index / size))

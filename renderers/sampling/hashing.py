@@ -103,7 +103,7 @@ def permute(index: int, count: int, key: int) -> int:
         i ^= i >> np.uint64(5)
         if i < np.uint64(count):
             break
-    return int((i + p) % np.uint64(count))
+    return int(np.int64((i + p) % np.uint64(count)))  # unsigned and signed make float64
 
 
 @njit(inline="always", cache=True)

@@ -160,7 +160,7 @@ def make_series(plan: Plan) -> Series:
 
 
 @njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
-def _errors(
+def errors(
     tables: WordArray,
     words: Tile,
     count: int,
@@ -173,8 +173,8 @@ def _errors(
 ) -> None:
     """Write E of one pixel to `out`, (2, terms): real and imaginary parts, up to the factor 1 / i."""
     edges, terms = direction.shape[1], len(scale)
-    fill_pair(tables, words, count, False, 0, 0, points[0])
-    fill_pair(tables, words, count, True, 0, 0, points[1])
+    fill_pair(tables, words, count, False, 0, 0, 0, points[0])
+    fill_pair(tables, words, count, True, 0, 0, 0, points[1])
     out[:] = np.float32(0.0)
     for s in range(count):
         x = np.float32((math.floor(points[0, s, 0] * COARSE) + 0.5) / COARSE - 0.5)
@@ -197,7 +197,7 @@ def _errors(
 
 
 @njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
-def _spread(change: Single, pixel: int, kernel: Single, h: Single) -> None:
+def spread(change: Single, pixel: int, kernel: Single, h: Single) -> None:
     """Add K times a change of one pixel's E to `h`, (SIDE^2, 2, terms)."""
     terms = change.shape[1]
     row, column = pixel // SIDE, pixel % SIDE
@@ -242,7 +242,7 @@ def _sweep(
         trial[:] = fields[pixel]
         trial[field] = int(unit(key, 4 * step + 2) * 65536.0) & masks[field]
         fill_words(trial, words)
-        _errors(tables, words, count, direction, scale, mean, turn, points, new)
+        errors(tables, words, count, direction, scale, mean, turn, points, new)
         cost = np.float32(0.0)
         for part in range(2):
             for k in range(terms):
@@ -259,11 +259,11 @@ def _sweep(
                     new[part, k] = value - E[pixel, part, k]
                     total[part, k] += new[part, k]
                     E[pixel, part, k] = value
-            _spread(new, pixel, kernel, h)
+            spread(new, pixel, kernel, h)
 
 
 @njit(cache=True, nogil=True)
-def _start(
+def start(
     tables: WordArray,
     fields: NDArray[np.int64],
     count: int,
@@ -278,8 +278,8 @@ def _start(
     words, points = np.empty(WORDS, np.uint64), np.empty((2, count, 2))
     for pixel in range(len(fields)):
         fill_words(fields[pixel], words)
-        _errors(tables, words, count, direction, scale, mean, turn, points, E[pixel])
-        _spread(E[pixel], pixel, kernel, h)
+        errors(tables, words, count, direction, scale, mean, turn, points, E[pixel])
+        spread(E[pixel], pixel, kernel, h)
 
 
 @njit(cache=True)
@@ -288,32 +288,36 @@ def _random_fields(key: int, out: NDArray[np.int64]) -> None:
         out.ravel()[k] = int(mix32(combine(key, k))) >> 16
 
 
+def phase_table() -> Single:
+    """Return (2, PHASES) parts of exp(-i phase) over a turn."""
+    angle = 2.0 * math.pi * np.arange(PHASES) / PHASES
+    return np.stack([np.cos(angle), -np.sin(angle)]).astype(np.float32)
+
+
 def make_tile(count: int, plan: Plan) -> NDArray[np.uint16]:
     """Return the tile for `count` samples as (SIDE^2, FIELDS) fields, see `bluenoise.FIELDS`."""
     tables, series, free = sobol_tables(), make_series(plan), np.array(plan.fields)
-    angle = 2.0 * math.pi * np.arange(PHASES) / PHASES
-    turn = np.stack([np.cos(angle), -np.sin(angle)]).astype(np.float32)
-    terms = (series.direction, series.scale, series.mean, turn)
+    terms = (series.direction, series.scale, series.mean, phase_table())
     fields = np.zeros((SIDE * SIDE, FIELDS), np.int64)
     _random_fields(int(combine(0xB10E, count)), fields)
     fields &= MASKS
     fields[:, np.setdiff1d(np.arange(FIELDS), free)] = 0
     E = np.zeros((SIDE * SIDE, 2, len(series.scale)), np.float32)
     h = np.zeros_like(E)
-    _start(tables, fields, count, *terms, series.kernel, E, h)
+    start(tables, fields, count, *terms, series.kernel, E, h)
     own = series.kernel[0, REACH, REACH]
     # What random keys have, from the tile of random keys.
-    wanted = _own_energy(E, own)
+    wanted = own_energy(E, own)
     change, keep = 2.0 * wanted / SIDE**2, 0.5
     for k in range(plan.sweeps):
         heat = HOT * (COLD / HOT) ** (k / (plan.sweeps - 1)) * change
         key = int(combine(combine(0x5EED, count), k))
         _sweep(tables, fields, free, MASKS, count, *terms, series.kernel, series.even, keep, heat, key, E, h)
-        keep += 0.5 * (1.0 - _own_energy(E, own) / wanted)
+        keep += 0.5 * (1.0 - own_energy(E, own) / wanted)
     return fields.astype(np.uint16)
 
 
-def _own_energy(E: Single, own: Single) -> float:
+def own_energy(E: Single, own: Single) -> float:
     return float((np.square(E).sum(axis=1).mean(axis=0, dtype=np.float64) * own).sum()) * len(E)
 
 

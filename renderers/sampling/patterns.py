@@ -22,6 +22,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from aliasbench.renderers.kernel_parts import called, inlined
 from aliasbench.renderers.sampling.bluenoise import (
     ORDER,
     PIXEL,
@@ -30,12 +31,14 @@ from aliasbench.renderers.sampling.bluenoise import (
     Tile,
     bluenoise_tile,
     fine_key,
-    quarter_key,
     tile_offset,
     tile_order,
-    tile_stream,
+    tile_place,
+    tile_point,
+    tile_streams,
 )
 from aliasbench.renderers.sampling.hashing import SHARED, combine, frame_key, permute, pixel_key, unit
+from aliasbench.renderers.sampling.rare import compiled_if_rare
 from aliasbench.renderers.sampling.sobol import (
     TABLE_BITS,
     WordArray,
@@ -62,6 +65,7 @@ SAMPLERS: Mapping[str, int] = {
 # Kernels are compiled anew for each plain integer that is written out in a call, but once for all of numpy's.
 DIM_X, DIM_TIME, DIM_LENS, DIM_LIGHT, DIM_WAVELENGTH, DIM_DIRECTION = (np.int64(d) for d in (0, 2, 3, 5, 7, 8))
 DIMENSIONS = 10
+AXIS_0, AXIS_1, AXIS_2 = (np.int64(axis) for axis in range(3))  # of the sequence
 _ORDER, _COLUMNS, _ROWS = 1, 2, 3  # what streams are derived from a dimension's
 _MOST_NUMBERS = 2**24
 _SHORT = 1 << TABLE_BITS
@@ -88,8 +92,8 @@ class Pattern(NamedTuple):
         See `sobol.sobol_tables`; empty for other samplers.
     tile : (side, side, WORDS) uint64
         See `bluenoise.bluenoise_tile`; empty for other samplers.
-    offsets : (DIMENSIONS, 2) int64
-        Where each dimension's tile starts, column and row.
+    offsets : (DIMENSIONS, 3) int64
+        Where each dimension's tile starts, column and row, and its orientation; see `bluenoise.tile_offset`.
     """
 
     sampler: int
@@ -102,6 +106,19 @@ class Pattern(NamedTuple):
     tables: WordArray
     tile: Tile
     offsets: NDArray[np.int64]
+
+
+class RarePattern(Pattern):
+    """A pattern of multijittered or bluenoise samples, whose code other kernels do without (`rare`)."""
+
+    __slots__ = ()
+    RARE = True
+
+
+def tile_offsets(start: int, side: int) -> NDArray[np.int64]:
+    """Return `Pattern.offsets` of a frame with the key `start`: the light and the pixel share a place."""
+    groups = [0 if dimension in (DIM_X, DIM_LIGHT) else dimension for dimension in range(DIMENSIONS)]
+    return np.array([tile_offset(np.uint64(start), group, side) for group in groups], np.int64)
 
 
 def sampler_code(name: str) -> int:
@@ -125,7 +142,7 @@ def make_pattern(name: str, count: int, start: int, *, shared: bool, progressive
     code = sampler_code(name)
     cells = np.zeros((4, count))
     tables, tile = np.zeros((2, 0, 0), np.uint32), np.zeros((0, 0, WORDS), np.uint64)
-    offsets = np.zeros((DIMENSIONS, 2), np.int64)
+    offsets = np.zeros((DIMENSIONS, 3), np.int64)
     places = np.zeros((3, count if code == MULTIJITTERED else 0), np.int32)
     if code == MULTIJITTERED:
         _fill_places(count, places)
@@ -135,10 +152,9 @@ def make_pattern(name: str, count: int, start: int, *, shared: bool, progressive
         _fill_cells(code, count, cells)
     if code == BLUENOISE:
         tile = bluenoise_tile(count).copy()  # kernels know writable arrays and others apart
-        for dimension in range(DIMENSIONS):
-            group = 0 if dimension in (DIM_X, DIM_LIGHT) else dimension  # light and pixel share a place
-            offsets[dimension] = tile_offset(np.uint64(start), group, len(tile))
-    return Pattern(code, count, np.uint64(start), shared, progressive, cells, places, tables, tile, offsets)
+        offsets = tile_offsets(start, len(tile))
+    kind = RarePattern if code in (MULTIJITTERED, BLUENOISE) else Pattern
+    return kind(code, count, np.uint64(start), shared, progressive, cells, places, tables, tile, offsets)
 
 
 @njit(cache=True)
@@ -204,34 +220,48 @@ def row_order(row: int, rows: int, stream: int) -> int:
     return permute(row, rows, combine(stream, _ROWS))
 
 
+@compiled_if_rare(np.uint64(0))
 @njit(cache=True)
 def _tile_word(pattern: Pattern, column: int, row: int, dimension: int, word: int) -> np.uint64:
     """Return a word of the tile for a dimension of a pixel."""
-    side = len(pattern.tile)
-    return pattern.tile[
-        (row + pattern.offsets[dimension, 1]) % side, (column + pattern.offsets[dimension, 0]) % side, word
-    ]
+    right, down, turn = pattern.offsets[dimension, 0], pattern.offsets[dimension, 1], pattern.offsets[dimension, 2]
+    across, along = tile_place(column, row, right, down, turn, len(pattern.tile))
+    return pattern.tile[along, across, word]
 
 
-@njit(inline="always", cache=True)
-def sequence_point(pattern: Pattern, dimension: int, number: int, stream: int) -> float:
+@inlined
+def sequence_point(pattern: Pattern, axis: int, number: int, stream: int) -> float:
     """Return a point of Sobol's sequence in [0, 1), scrambled as the sampler does it with a dimension's stream."""
-    bits = sobol_bits(pattern.tables, dimension, np.uint32(number))
     if pattern.sampler == BLUENOISE:
-        return scrambled_unit(bits, quarter_key(np.uint64(stream), bits))
-    return scrambled_unit(bits, np.uint32(stream))
+        return _tile_point(pattern, axis, number, stream)
+    return scrambled_unit(sobol_bits(pattern.tables, axis, np.uint32(number)), np.uint32(stream))
+
+
+@compiled_if_rare(0.0)
+@inlined
+def _tile_point(pattern: Pattern, axis: int, number: int, stream: int) -> float:
+    return tile_point(pattern.tables, axis, np.uint32(number), np.uint64(stream))
 
 
 @njit(cache=True)
 def stream_keys(pattern: Pattern, key: int, column: int, row: int, dimension: int) -> tuple[np.uint64, np.uint64]:
     """Return the keys of a dimension and the next for the pixel whose `pixel_key` is `key`."""
     if pattern.sampler == BLUENOISE:
-        first = PIXEL if dimension == DIM_X else SECOND
-        return (
-            tile_stream(_tile_word(pattern, column, row, dimension, first), fine_key(key, dimension, 0)),
-            tile_stream(_tile_word(pattern, column, row, dimension, first + 1), fine_key(key, dimension, 1)),
-        )
+        return _tile_keys(pattern, key, column, row, dimension)
     return combine(key, dimension), combine(key, dimension + 1)
+
+
+@compiled_if_rare((np.uint64(0), np.uint64(0)))
+@njit(cache=True)
+def _tile_keys(pattern: Pattern, key: int, column: int, row: int, dimension: int) -> tuple[np.uint64, np.uint64]:
+    first = PIXEL if dimension == DIM_X else SECOND
+    return tile_streams(
+        _tile_word(pattern, column, row, dimension, first),
+        _tile_word(pattern, column, row, dimension, first + 1),
+        pattern.offsets[dimension, 2],
+        fine_key(key, dimension, 0),
+        fine_key(key, dimension, 1),
+    )
 
 
 @njit(inline="always", cache=True)
@@ -240,36 +270,50 @@ def order_mask(count: int) -> int:
     return _SHORT - 1 if count <= _SHORT else _MOST_NUMBERS - 1
 
 
-@njit(inline="always", cache=True)
+@inlined
 def own_order(pattern: Pattern, count: int, index: int, key: int) -> int:
     """Return which point of a dimension's set of `count` belongs to sample `index`, under a key of its own."""
     if pattern.sampler == RANDOM:
         return index
     if pattern.sampler == SOBOL or (pattern.sampler == BLUENOISE and pattern.progressive):
-        return int(shuffled(index, np.uint32(key))) & order_mask(count)
+        return int(np.int64(shuffled(index, np.uint32(key)))) & order_mask(count)
     if pattern.sampler == BLUENOISE:
-        return tile_order(index, count, np.uint64(key))
+        return _tile_order(pattern, count, index, key)
     return permute(index, count, key)
 
 
-@njit(inline="always", cache=True)
+@compiled_if_rare(np.int64(0))
+@njit(cache=True, error_model="numpy")
+def _tile_order(pattern: Pattern, count: int, index: int, key: int) -> int:  # noqa: ARG001 - its type decides
+    return tile_order(index, count, np.uint64(key))
+
+
+@inlined
 def pair_position(
     pattern: Pattern, count: int, rows: int, number: int, index: int, first: int, second: int
 ) -> tuple[float, float]:
     """Return point `number` of a set of `count` in the unit square, for sample `index` and the streams' keys."""
     sampler = pattern.sampler
     if sampler in (SOBOL, BLUENOISE):
-        return sequence_point(pattern, 0, number, first), sequence_point(pattern, 1, number, second)
+        return sequence_point(pattern, AXIS_0, number, first), sequence_point(pattern, AXIS_1, number, second)
     if sampler in (CENTER, GRID):
         return cell_position(number, count, rows, 0.5, 0.5)
     u, v = unit(first, index), unit(second, index)
     if sampler == RANDOM:
         return u, v
     if sampler == MULTIJITTERED:
-        row, start, n = cell_of(number, count, rows)
-        u = (row_order(row, rows, first) + u) / rows
-        v = (column_order(number - start, n, second) + v) / n
+        u, v = _finer_position(pattern, count, rows, number, first, second, u, v)
     return cell_position(number, count, rows, u, v)
+
+
+@compiled_if_rare((0.0, 0.0))
+@called
+def _finer_position(
+    pattern: Pattern, count: int, rows: int, number: int, first: int, second: int, u: float, v: float,  # noqa: ARG001
+) -> tuple[float, float]:  # fmt: skip
+    """Return the place in its cell of a multijittered sample."""
+    row, start, n = cell_of(number, count, rows)
+    return (row_order(row, rows, first) + u) / rows, (column_order(number - start, n, second) + v) / n
 
 
 @njit(inline="always", cache=True)
@@ -299,7 +343,7 @@ def line_position(pattern: Pattern, count: int, index: int, stream: int, order: 
         return unit(stream, index)
     number = own_order(pattern, count, index, order)
     if sampler in (SOBOL, BLUENOISE):
-        return sequence_point(pattern, 0, number, stream)
+        return sequence_point(pattern, AXIS_0, number, stream)
     if sampler in (CENTER, GRID):
         return (number + 0.5) / count
     return (number + unit(stream, index)) / count
@@ -312,7 +356,7 @@ def shutter_position(pattern: Pattern, count: int, index: int, stream: int, orde
     The centre and grid samplers take the middle of each stratum; one sample is in the middle of the shutter then.
     """
     if pattern.sampler == SOBOL:
-        return sequence_point(pattern, 2, index, stream)
+        return sequence_point(pattern, AXIS_2, index, stream)
     return line_position(pattern, count, index, stream, order)
 
 
@@ -337,24 +381,35 @@ def pattern_frame(reseed: str, frame: int) -> int:
     return 0 if reseed == "never" else frame
 
 
+@called
+def _plane(
+    pattern: Pattern, count: int, index: int, key: int, column: int, row: int, dimension: int
+) -> tuple[float, float]:
+    a, b = stream_keys(pattern, key, column, row, dimension)
+    rows = row_count(count)
+    if dimension == DIM_X:
+        return pixel_position(pattern, count, rows, index, a, b)
+    return plane_position(pattern, count, rows, index, a, b, plane_order(pattern, key, column, row, dimension))
+
+
+@called
+def _line(pattern: Pattern, count: int, index: int, key: int, column: int, row: int, dimension: int) -> float:
+    a, _ = stream_keys(pattern, key, column, row, dimension)
+    order = line_order(pattern, key, column, row, dimension)
+    if dimension == DIM_TIME:
+        return shutter_position(pattern, count, index, a, order)
+    return line_position(pattern, count, index, a, order)
+
+
 @njit(cache=True)
 def _fill(pattern: Pattern, column: int, row: int, out: FloatArray) -> None:
     count = pattern.samples
-    rows = row_count(count)
     key = pixel_key(pattern.start, column, row)
     for index in range(count):
-        a, b = stream_keys(pattern, key, column, row, DIM_X)
-        out[index, 0], out[index, 1] = pixel_position(pattern, count, rows, index, a, b)
-        a, _ = stream_keys(pattern, key, column, row, DIM_TIME)
-        out[index, 2] = shutter_position(pattern, count, index, a, line_order(pattern, key, column, row, DIM_TIME))
-        for pair in (DIM_LENS, DIM_LIGHT, DIM_DIRECTION):
-            a, b = stream_keys(pattern, key, column, row, pair)
-            x, y = plane_position(pattern, count, rows, index, a, b, plane_order(pattern, key, column, row, pair))
-            out[index, pair], out[index, pair + 1] = x, y
-        a, _ = stream_keys(pattern, key, column, row, DIM_WAVELENGTH)
-        out[index, DIM_WAVELENGTH] = line_position(
-            pattern, count, index, a, line_order(pattern, key, column, row, DIM_WAVELENGTH)
-        )
+        for pair in (DIM_X, DIM_LENS, DIM_LIGHT, DIM_DIRECTION):
+            out[index, pair], out[index, pair + 1] = _plane(pattern, count, index, key, column, row, pair)
+        for line in (DIM_TIME, DIM_WAVELENGTH):
+            out[index, line] = _line(pattern, count, index, key, column, row, line)
 
 
 def sample_set(

@@ -18,7 +18,7 @@ from aliasbench.renderers.catalog import prepare, render
 from aliasbench.scenes.model import Animation, Camera, FloatArray, Scene
 from aliasbench.scenes.shapes import polygon
 
-SAMPLERS = ("random", "jittered", "multijittered", "sobol")
+SAMPLERS = ("random", "jittered", "multijittered", "sobol", "bluenoise")
 EYE_Z = 6.0
 PERSPECTIVE = Camera("perspective", position=(0.0, 0.0, EYE_Z), fov_y_deg=40.0, lens_radius=0.5, focus_distance=5.0)
 PARALLEL = Camera("orthographic", position=(0.0, 0.0, EYE_Z), height=3.0, lens_radius=0.5, focus_distance=5.0)

@@ -39,7 +39,7 @@ from aliasbench.scenes.projection import focus_at, lens_view, view_at
 from aliasbench.scenes.shapes import polygon
 
 TRIALS = int(os.environ.get("TRIALS", "10"))
-SAMPLERS = ("random", "jittered", "multijittered", "sobol")
+SAMPLERS = ("random", "jittered", "multijittered", "sobol", "bluenoise")
 FLOOR = [(-4.0, 0.0, 4.0), (4.0, 0.0, 4.0), (4.0, 0.0, -4.0), (-4.0, 0.0, -4.0)]
 SQUARE_UV = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))
 DOWN = Camera("orthographic", position=(0.0, 0.5, 0.0), target=(0.0, 0.0, 0.0), up=(0.0, 0.0, -1.0), height=2.0)

@@ -21,7 +21,7 @@ from aliasbench.scenes.files import load_scene
 from aliasbench.scenes.model import Camera, Checker, FloatArray, Light, Material, Motion, Scene, Surface, Vec3
 from aliasbench.scenes.shapes import polygon
 
-SAMPLERS = ("random", "jittered", "multijittered", "sobol")
+SAMPLERS = ("random", "jittered", "multijittered", "sobol", "bluenoise")
 WHITE, BLACK = (1.0, 1.0, 1.0), (0.0, 0.0, 0.0)
 FAR = 500.0
 

@@ -1,5 +1,6 @@
 """Laws of the blue-noise sampler, and its purpose in a model of a penumbra."""
 
+import itertools
 import math
 from collections.abc import Callable
 from functools import cache
@@ -10,10 +11,12 @@ from numba import njit
 from numpy.typing import NDArray
 from scipy import ndimage, stats
 
-from aliasbench.renderers.sampling import make_bluenoise
+from aliasbench.renderers.sampling import level_bluenoise, make_bluenoise
 from aliasbench.renderers.sampling.bluenoise import (
     DATA,
+    EXCESS,
     FIELDS,
+    LEVEL,
     LEVELS,
     OWN,
     SIDE,
@@ -36,6 +39,7 @@ COUNTS = (1, 2, 3, 4, 5, 7, 8, 10, 16, 17, 32, 64)
 SIZE = 2 * SIDE
 SLOPES = (0.06, 0.1, 0.16)  # penumbrae of 17, 10 and 6 pixels
 ANGLES_DEG = (21.6, 45.0, 111.6)
+DRAWS = 50_000
 
 
 @njit
@@ -51,6 +55,28 @@ def picture(tile: Tile, count: int, *, seed: int, pair: int, size: int = SIZE) -
     """Points (row, column, sample, 2) of all pixels of a square picture."""
     points: FloatArray = _picture(sobol_tables(), tile, count, int(frame_key(seed, 0)), size, pair)
     return points
+
+
+@njit
+def _seeds(tables: WordArray, tile: Tile, count: int, out: FloatArray) -> None:
+    for seed in range(len(out)):
+        for pair in range(3):
+            fill_pixel(tables, tile, count, frame_key(seed, 0), 5, 9, pair, out[seed, :, 2 * pair : 2 * pair + 2])
+
+
+@cache
+def one_pixel(count: int) -> FloatArray:
+    """Points (DRAWS, sample, 6) of one pixel under many seeds: x, y, u, v, and those of the third pair."""
+    out = np.empty((DRAWS, count, 6))
+    _seeds(sobol_tables(), bluenoise_tile(count), count, out)
+    return out
+
+
+@cache
+def seeds_by_orientation() -> tuple[int, ...]:
+    """The first seed that has each orientation of the pixel's tile."""
+    turns = [tile_offset(int(frame_key(s, 0)), 0, SIDE)[2] for s in range(100)]
+    return tuple(turns.index(turn) for turn in range(8))
 
 
 @cache
@@ -156,12 +182,39 @@ def test_the_size_of_errors_is_that_of_random_keys(count: int) -> None:
 @pytest.mark.parametrize("pair", [0, 1, 2])
 @pytest.mark.parametrize("count", [2, 4, 8, 16, 32])
 def test_points_are_a_net(count: int, pair: int) -> None:
-    """Scrambled Sobol points of dimensions 0 and 1: one in every elementary interval of area 1 / N."""
-    points = picture(bluenoise_tile(count), count, seed=3, pair=pair, size=8).reshape(-1, count, 2)
-    bits = int(math.log2(count))
-    for m in range(bits + 1):
-        cell = np.floor(points[..., 0] * 2**m) * 2 ** (bits - m) + np.floor(points[..., 1] * 2 ** (bits - m))
-        assert np.array_equal(np.sort(cell, axis=1), np.broadcast_to(np.arange(count), cell.shape))
+    """Scrambled Sobol points of two dimensions, in any orientation: one in each elementary interval of area 1 / N.
+
+    So are the first 2, 4, ... places in the pixel.
+    """
+    pictures = [picture(bluenoise_tile(count), count, seed=s, pair=pair, size=8) for s in seeds_by_orientation()]
+    points = np.stack(pictures).reshape(-1, count, 2)
+    for first in (points[:, : 1 << k] for k in range(1, int(math.log2(count)) + 1)) if pair == 0 else (points,):
+        bits = int(math.log2(first.shape[1]))
+        for m in range(bits + 1):
+            cell = np.floor(first[..., 0] * 2**m) * 2 ** (bits - m) + np.floor(first[..., 1] * 2 ** (bits - m))
+            assert np.array_equal(np.sort(cell, axis=1), np.broadcast_to(np.arange(2**bits), cell.shape))
+
+
+@pytest.mark.parametrize("count", [4, 16])
+def test_errors_are_blue_in_every_orientation(count: int) -> None:
+    """Had an orientation the light the other way than the pixel, errors of 16 samples would be white in it."""
+    for seed in seeds_by_orientation():
+        found = [penumbra_errors(lambda _: bluenoise_tile(count), count, a, 0.1, seed) for a in ANGLES_DEG]
+        assert np.mean([blue_ratio(e) for e in found]) <= 0.6
+
+
+@pytest.mark.parametrize("count", [1, 4, 5, 16])
+def test_coordinates_and_products_that_an_orientation_turns_have_no_bias(count: int) -> None:
+    """Over a whole tile in all orientations only the bits below the first 8 are left to chance."""
+    seeds = seeds_by_orientation()
+    points = [[picture(bluenoise_tile(count), count, seed=s, pair=p, size=SIDE) - 0.5 for s in seeds] for p in (0, 1)]
+    (x, y), (u, v) = (np.moveaxis(np.array(p), -1, 0) for p in points)
+    # A product with a number below 1/2 varies less.
+    deviation = 2.0**-8 / math.sqrt(12.0 * x.size / count)
+    for value in (x, y, u, v, x * y, u * v, x * v, y * u):
+        assert abs(value.mean()) < 5.0 * deviation
+    # One orientation alone has one.
+    assert max(abs(p.mean()) for pair in points for one in pair for p in np.moveaxis(one, -1, 0)) > 5.0 * deviation
 
 
 @pytest.mark.parametrize("count", COUNTS)
@@ -176,21 +229,79 @@ def test_the_second_pairs_order_permutes_and_keeps_the_first_block(count: int) -
     assert len(seen) == 1 if count == 1 else len(seen) > 1
 
 
-@pytest.mark.parametrize("count", [1, 4, 10, 16])
-@pytest.mark.parametrize("pair", [0, 1, 2])
-def test_points_of_a_pixel_are_uniform_over_seeds(count: int, pair: int) -> None:
-    """Chi-square of cells, and of what is below the 8 bits that a tile fixes.
+@pytest.mark.parametrize("count", [1, 2, 4, 10, 16])
+def test_points_of_a_pixel_are_uniform_over_seeds(count: int) -> None:
+    """Chi-square of each sample in cells of every pair, and of what is below the 8 bits that a tile fixes.
 
-    A tile has SIDE^2 places; drawn by chance, they would add n / SIDE^2 to the variance of counts of n draws.
+    Of many more seeds than the tile has places, yet only samples beyond a level have room for its unevenness.
     """
-    draws = 8000 // count
-    points = np.array([bluenoise_set(count, seed=s, pixel=(5, 9), pair=pair) for s in range(draws)])
-    cells = np.floor(points.reshape(-1, 2) * 8.0).astype(int) @ (8, 1)
-    statistic = stats.chisquare(np.bincount(cells, minlength=64)).statistic / (1.0 + draws / SIDE**2)
-    assert stats.chi2.sf(statistic, 63) > 1e-4
-    fine = np.floor(points.reshape(-1, 2) * 4096.0).astype(int) % 16
-    for d in range(2):
-        assert stats.chisquare(np.bincount(fine[:, d], minlength=16)).pvalue > 1e-4
+    assert DRAWS > 10 * SIDE**2
+    points = one_pixel(count)
+    cells = np.floor(points * 8.0).astype(int)
+    p_values = []
+    for a, b in itertools.combinations(range(6), 2):
+        for k in range(count):
+            room = 1.0 + (0.0 if count in LEVELS else EXCESS * DRAWS / SIDE**2)
+            counts = np.bincount(8 * cells[:, k, a] + cells[:, k, b], minlength=64)
+            p_values.append(stats.chi2.sf(stats.chisquare(counts).statistic / room, 63))
+    fine = np.floor(points * 4096.0).astype(int) % 16
+    p_values += [stats.chisquare(np.bincount(fine[..., d].ravel(), minlength=16)).pvalue for d in range(6)]
+    assert min(p_values) > 1e-3 / len(p_values)
+
+
+@pytest.mark.parametrize("count", [1, 2, 4, 8, 16])
+def test_means_of_arranged_pairs_hardly_depend_on_each_other(count: int) -> None:
+    """A sample's place says nothing of its light point; means of sets may, as far as annealing gains by it.
+
+    An edge's variance is changed by at most 2 |a| of their correlation, in which a border of 4 pixels has |a| = 1/4.
+    """
+    points = one_pixel(count)
+    chance = 5.0 / math.sqrt(DRAWS)
+    means = np.corrcoef(points.mean(axis=1).T)
+    assert np.abs(means[:2, 2:4]).max() <= 0.1 + chance
+    assert np.abs(means[:4, 4:]).max() <= chance
+    for k in range(count):
+        # Twice chance: cells of an eighth are level, not what is in them.
+        assert np.abs(np.corrcoef(points[:, k].T)[:2, 2:]).max() <= 2.0 * chance
+
+
+@pytest.mark.parametrize("count", LEVELS)
+def test_tiles_are_level(count: int) -> None:
+    with np.load(DATA) as data:
+        fields = from_planes(data[f"level_{count}"]).astype(np.int64)
+    _, counts = level_bluenoise.tile_counts(sobol_tables(), fields, count)
+    excess = counts - level_bluenoise.even_counts()
+    assert np.abs(excess).max() <= LEVEL
+    assert np.sqrt(np.square(excess).mean()) <= 1.5
+
+
+def test_classes_of_cells_are_what_the_orientations_exchange() -> None:
+    """Orbits under all symmetries of the square, done to both points at once, have a slot each, and all points."""
+
+    def slots(x: int, y: int, u: int, v: int) -> NDArray[np.int64]:
+        out = np.empty(level_bluenoise.KINDS, np.int64)
+        level_bluenoise.fill_slots(np.array([x, y, u, v]), out)
+        return out
+
+    members: dict[int, set[tuple[str, int, int]]] = {}
+    last = level_bluenoise.CELLS * level_bluenoise.FINE - 1
+    for x, y, u, v in np.random.default_rng(0).integers(0, last + 1, (20_000, 4)).tolist():
+        found = slots(x, y, u, v)
+        assert sorted(slots(last - x, y, last - u, v)) == sorted(found)
+        assert sorted(slots(x, last - y, u, last - v)) == sorted(found)
+        assert sorted(slots(y, x, v, u)) == sorted(found)
+        names = ("xy", "uv", "xu", "yv", "xv", "yu")
+        place = {"x": x, "y": y, "u": u, "v": v}
+        cells = [(a + b, place[a] // level_bluenoise.FINE, place[b] // level_bluenoise.FINE) for a, b in names]
+        cells += [(a, part, 0) for a, part in place.items()]
+        for slot, cell in zip(found.tolist(), cells, strict=True):
+            members.setdefault(slot, set()).add(cell)
+    # 10 classes of (x, y), as many of (u, v), 32, 16, and half the parts of either pair
+    assert len(members) == 10 + 10 + 32 + 16 + 32 + 32
+    even = level_bluenoise.even_counts()
+    for slot, cells in members.items():
+        assert even[slot] == sum(SIDE**2 // 64 for _ in cells)
+    assert even.sum() == level_bluenoise.KINDS * SIDE**2
 
 
 @pytest.mark.parametrize("pair", [0, 1])
@@ -229,7 +340,8 @@ def test_errors_of_far_pixels_do_not_correlate(count: int) -> None:
 def test_pairs_from_the_third_have_their_own_places_in_the_tile() -> None:
     places = {group: [tile_offset(int(frame_key(s, 0)), group, SIDE) for s in range(200)] for group in range(4)}
     for group, values in places.items():
-        columns, rows = np.array(values).T
+        columns, rows, turns = np.array(values).T
+        assert np.bincount(turns, minlength=8).min() > 8  # of 25, with a deviation of 4.7
         assert columns.min() < 6
         assert columns.max() >= SIDE - 6
         assert abs(np.corrcoef(columns, rows)[0, 1]) < 0.3

@@ -1,7 +1,10 @@
 """Laws of the sample patterns, over every sampler and awkward counts: strata, uniformity, independence, no bias.
 
 Statistical laws hold a family of p-values against Sidak's limit for one false alarm in a thousand; seeds are fixed, so
-none ever flickers. TRIALS=10 asks for ten times as many pixels. `bluenoise` has laws of its own.
+none ever flickers. TRIALS=10 asks for ten times as many pixels.
+
+Pixels of `bluenoise` belong together on purpose within one picture, so that laws of chance draw each of its sets under
+another seed, and look at neighbours beyond its reach. `test_bluenoise` has more laws of it.
 """
 
 import itertools
@@ -13,14 +16,22 @@ import pytest
 from numba import njit
 from scipy import stats
 
-from aliasbench.renderers.sampling import patterns
+from aliasbench.renderers.sampling import bluenoise, patterns
 from aliasbench.renderers.sampling.hashing import SHARED, frame_key
-from aliasbench.renderers.sampling.patterns import SAMPLERS, make_pattern, pattern_frame, sample_set, sampler_code
+from aliasbench.renderers.sampling.patterns import (
+    SAMPLERS,
+    RarePattern,
+    make_pattern,
+    pattern_frame,
+    sample_set,
+    sampler_code,
+    tile_offsets,
+)
 from aliasbench.scenes.errors import InputError
 from aliasbench.scenes.model import FloatArray
 
-NAMES = tuple(name for name in SAMPLERS if name != "bluenoise")
-DRAWN = ("random", "jittered", "multijittered", "sobol")
+NAMES = tuple(SAMPLERS)
+DRAWN = ("random", "jittered", "multijittered", "sobol", "bluenoise")
 ORDERED = ("center", "grid", "jittered", "multijittered")
 COUNTS = (1, 2, 3, 4, 5, 7, 8, 11, 16, 17, 64, 97, 256)
 X, Y, TIME, LENS, LIGHT, WAVELENGTH, DIRECTION, DIMENSIONS = 0, 1, 2, 3, 5, 7, 8, 10
@@ -28,6 +39,7 @@ PAIRS = (LENS, LIGHT, DIRECTION)
 SIDE = 64
 PIXELS = SIDE * SIDE * max(1, int(os.environ.get("TRIALS", "0")))
 FALSE_ALARMS = 1e-3
+REACH = 6  # pixels, within which those of bluenoise depend on each other: a blur's kernel applied twice
 
 fill = patterns._fill
 
@@ -48,6 +60,34 @@ def sets(name: str, count: int, pixels: int = PIXELS, *, seed: int = 0, frame: i
     out = np.empty((pixels, count, DIMENSIONS))
     fill_many(make_pattern(name, count, frame_key(seed, frame), shared=False), pixel_places(pixels), out)
     return out
+
+
+@njit(cache=True, nogil=True)
+def fill_draws(p, starts, offsets, places, out):
+    for k in range(len(places)):
+        one = RarePattern(
+            p.sampler, p.samples, starts[k], p.shared, p.progressive, p.cells, p.places, p.tables, p.tile, offsets[k]
+        )
+        fill(one, places[k, 0], places[k, 1], out[k])
+
+
+def seed_sets(
+    name: str, count: int, seeds: np.ndarray, *, frame: int = 0, shift: tuple[int, int] = (0, 0)
+) -> FloatArray:
+    """Return a set of each seed, (seeds, count, 10), of one pixel after the other, all displaced by `shift`."""
+    pattern = make_pattern(name, count, frame_key(0, 0), shared=False)
+    starts = np.array([frame_key(int(seed), frame) for seed in seeds], np.uint64)
+    offsets = np.array([tile_offsets(start, bluenoise.SIDE) for start in starts])
+    out = np.empty((len(seeds), count, DIMENSIONS))
+    fill_draws(pattern, starts, offsets, pixel_places(len(seeds)) + shift, out)
+    return out
+
+
+def draws(name: str, count: int, pixels: int = PIXELS, *, seed: int = 0) -> FloatArray:
+    """Return independent sets (pixels, count, 10): the pixels of a picture, or each of a seed of its own."""
+    if name == "bluenoise":
+        return seed_sets(name, count, np.arange(seed * pixels, (seed + 1) * pixels))
+    return sets(name, count, pixels, seed=seed)
 
 
 def row_ends(count: int) -> list[int]:
@@ -82,12 +122,21 @@ def assert_chance(p_values: FloatArray, what: str) -> None:
     assert p.min() > limit, f"{what}: smallest of {p.size} p-values {p.min():.2e} at {p.argmin()}, limit {limit:.2e}"
 
 
-def uniform_p_values(cells: np.ndarray, kinds: int) -> FloatArray:
-    """Return a chi-square p-value for each column of (draws, columns) cell numbers, out of `kinds` equal cells."""
-    draws, columns = cells.shape
+def uniform_p_values(cells: np.ndarray, kinds: int, excess: float = 0.0) -> FloatArray:
+    """Return a chi-square p-value for each column of (draws, columns) cell numbers, out of `kinds` equal cells.
+
+    `excess` is by what share the statistic is larger than chance has it.
+    """
+    n, columns = cells.shape
     counts = np.bincount((np.arange(columns) * kinds + cells).ravel(), minlength=columns * kinds)
-    expected = draws / kinds
-    return stats.chi2.sf(((counts.reshape(columns, kinds) - expected) ** 2).sum(axis=1) / expected, kinds - 1)
+    expected = n / kinds
+    statistic = ((counts.reshape(columns, kinds) - expected) ** 2).sum(axis=1) / expected
+    return stats.chi2.sf(statistic / (1.0 + excess), kinds - 1)
+
+
+def excess_of(name: str, seeds: int) -> float:
+    """Return the `excess` of that many independent sets: places in a tile of keys are not uniform (`bluenoise`)."""
+    return bluenoise.EXCESS * seeds / bluenoise.SIDE**2 if name == "bluenoise" else 0.0
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -142,7 +191,7 @@ def test_multijittered_rows_and_columns_share_one_order(rows: int) -> None:
 @pytest.mark.parametrize("count", COUNTS)
 def test_times_and_wavelengths_are_stratified(name: str, count: int, dimension: int) -> None:
     numbers = sets(name, count, 20, seed=2)[..., dimension]
-    if name == "sobol" and count & (count - 1):
+    if name in ("sobol", "bluenoise") and count & (count - 1):
         # Of a sequence, the largest power of two of its samples is.
         count = 1 << (count.bit_length() - 1)
         numbers = numbers[:, :count]
@@ -192,6 +241,19 @@ def test_fewer_samples_are_the_first_of_more(name: str) -> None:
         assert np.array_equal(whole[:count], sample_set(name, count, seed=6, pixel=(2, 9)))
 
 
+@pytest.mark.parametrize("count", COUNTS)
+def test_fewer_samples_of_bluenoise_are_the_first_of_more_that_share_a_tile(count: int) -> None:
+    # Places in the pixel are; of other dimensions the first power of two has the same points in the same order.
+    power = 1 << (count.bit_length() - 1)
+    few, more, twice = (sample_set("bluenoise", n, seed=6, pixel=(2, 9)) for n in (count, 2 * power - 1, 2 * power))
+    assert np.array_equal(more[:count, :TIME], few[:, :TIME])
+    assert np.array_equal(more[:power], few[:power])
+    if power < bluenoise.LEVELS[-1]:
+        assert not np.isin(twice[:count], few).any()
+    else:
+        assert np.array_equal(twice[:count, :TIME], few[:, :TIME])
+
+
 def in_cells(name: str, points: FloatArray) -> FloatArray:
     """Return sets with each sample's place in its pixel counted from its stratum's corner in units of its sides."""
     if name not in ("jittered", "multijittered"):
@@ -206,13 +268,13 @@ def in_cells(name: str, points: FloatArray) -> FloatArray:
 @pytest.mark.parametrize("count", [1, 5, 7, 16])
 def test_every_sample_is_uniform_in_every_dimension_and_pair(name: str, count: int) -> None:
     # Each index by itself, so that draws are independent: strata would otherwise hide what is uneven.
-    points = in_cells(name, sets(name, count, seed=4))
-    draws = len(points)
-    fine = (points * 64).astype(int).reshape(draws, -1)
-    assert_chance(uniform_p_values(fine, 64), f"{name}, 64 intervals of (index, dimension)")
+    points = in_cells(name, draws(name, count, seed=4))
+    fine = (points * 64).astype(int).reshape(len(points), -1)
+    excess = excess_of(name, len(points))
+    assert_chance(uniform_p_values(fine, 64, excess), f"{name}, 64 intervals of (index, dimension)")
     coarse = (points * 8).astype(int)
     for a, b in itertools.combinations(range(DIMENSIONS), 2):
-        p = uniform_p_values(coarse[..., a] * 8 + coarse[..., b], 64)
+        p = uniform_p_values(coarse[..., a] * 8 + coarse[..., b], 64, 0.0 if count in bluenoise.LEVELS else excess)
         assert_chance(1.0 - (1.0 - p) ** (DIMENSIONS * (DIMENSIONS - 1) / 2), f"{name}, 8 x 8 cells of {a} and {b}")
 
 
@@ -220,11 +282,12 @@ def test_every_sample_is_uniform_in_every_dimension_and_pair(name: str, count: i
 @pytest.mark.parametrize("count", [7, 16])
 def test_all_samples_together_are_uniform_in_every_dimension_and_pair(name: str, count: int) -> None:
     # Strata make the counts more even than chance would, and the test the safer.
-    points = sets(name, count, seed=5).reshape(-1, DIMENSIONS)
-    assert_chance(uniform_p_values((points * 64).astype(int), 64), f"{name}, 64 intervals")
+    points = draws(name, count, seed=5).reshape(-1, DIMENSIONS)
+    excess = excess_of(name, len(points) // count)
+    assert_chance(uniform_p_values((points * 64).astype(int), 64, excess), f"{name}, 64 intervals")
     coarse = (points * 12).astype(int)
     pairs = [coarse[:, a] * 12 + coarse[:, b] for a, b in itertools.combinations(range(DIMENSIONS), 2)]
-    assert_chance(uniform_p_values(np.stack(pairs, axis=1), 144), f"{name}, 12 x 12 cells of pairs")
+    assert_chance(uniform_p_values(np.stack(pairs, axis=1), 144, excess), f"{name}, 12 x 12 cells of pairs")
 
 
 @pytest.mark.parametrize("name", ORDERED)
@@ -243,21 +306,28 @@ def test_orders_of_other_dimensions_are_random_in_themselves_and_to_each_other(n
     assert_chance(np.array(p_values), f"{name}, pairs of orders of {count}")
 
 
-def correlation_p_values(a: FloatArray, b: FloatArray, *, same: bool = False) -> FloatArray:
+def correlation_p_values(
+    a: FloatArray, b: FloatArray, *, same: bool = False, arranged: bool = False, excess: float = 0.0
+) -> FloatArray:
     """Return p-values of no correlation of any dimension of sets `a` with any of `b`, by samples and by pixel means.
 
     One number per pair of pixels, whose own spread is the measure: samples of a pixel need not be independent.
+    `arranged` leaves out the pixel means of places in the pixel against those of light points. `excess` is by what
+    share the variance of the products' mean is larger than chance has it.
     """
     out = []
-    for x, y in ((a, b), (a.mean(axis=1, keepdims=True), b.mean(axis=1, keepdims=True))):
+    for means in (False, True):
+        x, y = (s.mean(axis=1, keepdims=True) if means else s for s in (a, b))
         x, y = x - x.mean(axis=0), y - y.mean(axis=0)  # of each index by itself: the strata's places go
         products = np.einsum("pka,pkb->pab", x, y)
         spread = products.std(axis=0)
         told = spread > 1e-9  # what is the same in all pixels correlates with nothing
         if same:
             told &= ~np.eye(DIMENSIONS, dtype=bool)
+        if arranged and means:
+            told[X : Y + 1, LIGHT : LIGHT + 2] = told[LIGHT : LIGHT + 2, X : Y + 1] = False
         z = products.mean(axis=0)[told] / spread[told] * np.sqrt(len(products))
-        out.append(2.0 * stats.norm.sf(np.abs(z)))
+        out.append(2.0 * stats.norm.sf(np.abs(z) / np.sqrt(1.0 + excess)))
     return np.concatenate(out)
 
 
@@ -266,21 +336,40 @@ def correlation_p_values(a: FloatArray, b: FloatArray, *, same: bool = False) ->
     [(n, c) for n in NAMES for c in (1, 4, 5) if n in DRAWN or c > 1],  # else all in the middle of everything
 )
 def test_neighbouring_pixels_seeds_frames_and_dimensions_are_uncorrelated(name: str, count: int) -> None:
-    here = sets(name, count, seed=1)
-    picture = here.reshape(-1, SIDE, count, DIMENSIONS)
-    pairs = {
-        "right": (picture[:, :-1], picture[:, 1:]),
-        "below": (picture[:-1], picture[1:]),
-        "across": (picture[:-1, :-1], picture[1:, 1:]),
-        "seed": (here, sets(name, count, seed=2)),
-        "frame": (here, sets(name, count, seed=1, frame=1)),
-        "seed and frame": (sets(name, count, seed=0, frame=1), here),
-        "seed's upper half": (here, sets(name, count, seed=1 + 2**32)),
-    }
-    p_values = [
-        correlation_p_values(*(s.reshape(-1, count, DIMENSIONS) for s in pair), same=False) for pair in pairs.values()
-    ]
-    p_values.append(correlation_p_values(here, here, same=True))
+    if name == "bluenoise":
+        # Over seeds: within a picture all dimensions have one tile, which matches itself at some displacement.
+        seeds = np.arange(PIXELS)
+        here = seed_sets(name, count, seeds)
+        pairs = {
+            "right": (here, seed_sets(name, count, seeds, shift=(REACH + 1, 0))),
+            "below": (here, seed_sets(name, count, seeds, shift=(0, REACH + 1))),
+            "across": (here, seed_sets(name, count, seeds, shift=(REACH + 1, REACH + 1))),
+            "seed": (here, seed_sets(name, count, seeds + PIXELS)),
+            "next seed": (here[:-1], here[1:]),
+            "frame": (here, seed_sets(name, count, seeds, frame=1)),
+            "seed and frame": (here[1:], seed_sets(name, count, seeds[:-1], frame=1)),
+            "seed's upper half": (here, seed_sets(name, count, seeds + 2**32)),
+        }
+    else:
+        here = sets(name, count, seed=1)
+        picture = here.reshape(-1, SIDE, count, DIMENSIONS)
+        pairs = {
+            "right": (picture[:, :-1], picture[:, 1:]),
+            "below": (picture[:-1], picture[1:]),
+            "across": (picture[:-1, :-1], picture[1:, 1:]),
+            "seed": (here, sets(name, count, seed=2)),
+            "frame": (here, sets(name, count, seed=1, frame=1)),
+            "seed and frame": (sets(name, count, seed=0, frame=1), here),
+            "seed's upper half": (here, sets(name, count, seed=1 + 2**32)),
+        }
+    # Pairs of places in a tile of keys are SIDE^2, or twice as many where columns are swapped with rows.
+    in_tile = ("right", "below", "across") if name == "bluenoise" else ()
+    p_values = []
+    for which, pair in pairs.items():
+        excess = PIXELS / (2 * bluenoise.SIDE**2) if which in in_tile else 0.0
+        p_values.append(correlation_p_values(*(s.reshape(-1, count, DIMENSIONS) for s in pair), excess=excess))
+    # What bluenoise arranges is a pixel's set against its light's; how little that says is in `test_bluenoise`.
+    p_values.append(correlation_p_values(here, here, same=True, arranged=name == "bluenoise"))
     assert_chance(np.concatenate(p_values), name)
 
 
@@ -289,7 +378,7 @@ def test_neighbouring_pixels_seeds_frames_and_dimensions_are_uncorrelated(name: 
 def test_unrelated_dimensions_of_a_set_meet_by_chance(name: str, count: int) -> None:
     # Halves against halves: the sum over a set of the signs' products is +-N if one order serves both dimensions. Its
     # mean square is N by chance, and 2 N where a shuffled sequence gives neighbours, two by two, to both halves.
-    signs = np.where(sets(name, count, 1000, seed=21) < 0.5, -1.0, 1.0)
+    signs = np.where(draws(name, count, 1000, seed=21) < 0.5, -1.0, 1.0)
     squares = (np.einsum("pka,pkb->pab", signs, signs) ** 2).mean(axis=0)
     group = np.array([0, 0, 0, 1, 1, 2, 2, 3, 4, 4])
     unrelated = group[:, None] != group
@@ -313,7 +402,7 @@ INTEGRALS = np.array([0.5, 0.5, 0.25, 0.6 - 0.37 / 2, 1.0 - 0.35 - 0.2 / 2])
 def test_no_count_loses_samples_or_is_biased(name: str) -> None:
     worst = []
     for count in range(1, 21):
-        means = integrands(sets(name, count, 4000, seed=count))
+        means = integrands(draws(name, count, 4000, seed=count))
         error = means.std(axis=0, ddof=1) / np.sqrt(len(means))
         assert (error > 0.0).all()
         worst.append(np.abs(means.mean(axis=0) - INTEGRALS) / error)
