@@ -65,7 +65,7 @@ class Guard:
         self._perspective = scene.camera.projection == "perspective"
         self._polygon = np.array([s.is_polygon for s in scene.objects], dtype=bool)
         self._limit = _REACH / max(size)
-        still = scene.camera.is_static
+        still = scene.camera.is_static and scene.camera.lens_radius == 0.0
         self._changing = np.array([not (still and b.motion.is_static) for b in self._bodies], dtype=bool)
         self._steady: BoolArray | None = None
 

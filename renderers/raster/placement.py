@@ -60,8 +60,17 @@ def make_placement(bodies: Sequence[Body]) -> Placement:
     )
 
 
-def body_matrices(p: Placement, animation: Animation, frame: int, fraction: float, eye: FloatArray) -> FloatArray:
-    """Return (n, 4, 4) float64 matrices from each body's vertices to the world relative to `eye` at a time."""
+def body_matrices(
+    p: Placement, animation: Animation, frame: int, fraction: float, eye: FloatArray, *, interpolated: bool = False
+) -> FloatArray:
+    """Return (n, 4, 4) float64 matrices from each body's vertices to the world relative to `eye` at a time.
+
+    `interpolated` matrices are the lecture's: between those at the begin and the end of the frame interval, linearly.
+    """
+    if interpolated:
+        begin, end = (body_matrices(p, animation, frame, f, eye) for f in (0.0, 1.0))
+        between: FloatArray = (1.0 - fraction) * begin + fraction * end
+        return between
     rotations = _rotations(p, animation, frame, fraction)
     t = (frame + fraction) / animation.fps
     out = np.zeros((len(p.bodies), 4, 4))

@@ -10,6 +10,7 @@ the camera is kept and the rest is cut.
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,7 @@ from aliasbench.renderers.geometry import LAYER_STEP
 from aliasbench.renderers.raster.placement import Placement, body_matrices
 from aliasbench.scenes.errors import InputError
 from aliasbench.scenes.model import Camera, FloatArray, Scene
-from aliasbench.scenes.projection import View, view_at
+from aliasbench.scenes.projection import View, focus_at, lens_view, view_at
 
 # near in units of the farthest point: small enough to cut nothing, and far from float32's smallest numbers
 _NEAR = 2.0**-64
@@ -36,33 +37,65 @@ class DepthRule:
     empty: float
 
 
+class Window(NamedTuple):
+    """Which drawn pixels of a picture are drawn: the first column and row (negative in a margin), and how many."""
+
+    left: int
+    top: int
+    width: int
+    height: int
+
+
+@dataclass(frozen=True, slots=True)
+class Instant:
+    """When and from where a pass looks.
+
+    Attributes
+    ----------
+    frame : int
+    fraction : float
+        Time within the frame interval, see `motion`.
+    jitter : (x, y)
+        In drawn pixels, right and down: what is drawn at a pixel's centre is the picture at the centre plus the jitter.
+    lens : (a, b)
+        Where on the lens, in units of its radius along right and up.
+    interpolated : bool
+        Objects move linearly between their matrices at the begin and the end of the frame interval.
+    """
+
+    frame: int
+    fraction: float
+    jitter: tuple[float, float] = (0.0, 0.0)
+    lens: tuple[float, float] = (0.0, 0.0)
+    interpolated: bool = False
+
+
+def pass_view(scene: Scene, instant: Instant, size: tuple[int, int]) -> View:
+    """Return the camera's view of a pass for a picture of `size` drawn pixels."""
+    camera, frame, fraction = scene.camera, instant.frame, instant.fraction
+    view = view_at(camera, scene.animation, frame, fraction, size)
+    if camera.lens_radius > 0.0:
+        a, b = (camera.lens_radius * c for c in instant.lens)
+        view = lens_view(view, a, b, focus_at(camera, scene.animation, frame, fraction))
+    return view
+
+
 def depth_rule(camera: Camera) -> DepthRule:
     """Return the depth comparison that belongs to `clip_matrices` of this camera."""
     return DepthRule(">=", 0.0) if camera.projection == "perspective" else DepthRule("<=", 1.0)
 
 
 def clip_matrices(
-    scene: Scene,
-    placement: Placement,
-    *,
-    size: tuple[int, int],
-    frame: int,
-    fraction: float,
-    jitter: tuple[float, float],
-    margin: int = 0,
+    scene: Scene, placement: Placement, instant: Instant, *, size: tuple[int, int], window: Window
 ) -> FloatArray:
-    """Return (n, 4, 4) float64 matrices from each body's vertices to clip space at one time.
+    """Return (n, 4, 4) float64 matrices from each body's vertices to the clip space of a window of the picture.
 
     Parameters
     ----------
     placement : Placement
         The scene's bodies.
-    fraction : float
-        Time within the frame interval, see `motion`.
-    jitter : (x, y)
-        In pixels, right and down: what is drawn at a pixel's centre is the picture at the centre plus the jitter.
-    margin : int
-        Pixels that the target is larger than the picture, on each side.
+    size : (width, height)
+        Of the whole picture in drawn pixels.
 
     Raises
     ------
@@ -71,38 +104,34 @@ def clip_matrices(
     """
     # what overflows is refused below
     with np.errstate(over="ignore", invalid="ignore"):
-        out, farthest = _compose(scene, placement, size, frame, fraction, jitter, margin)
+        out, farthest = _compose(scene, placement, instant, size, window)
     if not farthest <= MOST_DISTANT:
         raise InputError(
-            f"frame {frame}: the scene reaches {farthest:.3g} world units from the camera; "
+            f"frame {instant.frame}: the scene reaches {farthest:.3g} world units from the camera; "
             f"the rasterizer draws up to {MOST_DISTANT:.3g}"
         )
     if not np.isfinite(out).all() or np.abs(out).max(initial=0.0) > MOST_DISTANT**2:
         raise InputError(
-            f"frame {frame}: the scene reaches {farthest:.3g} world units from the camera, "
+            f"frame {instant.frame}: the scene reaches {farthest:.3g} world units from the camera, "
             "too many pictures wide for the rasterizer; use a larger height or fov_y_deg"
         )
     return out
 
 
 def _compose(
-    scene: Scene,
-    placement: Placement,
-    size: tuple[int, int],
-    frame: int,
-    fraction: float,
-    jitter: tuple[float, float],
-    margin: int,
+    scene: Scene, placement: Placement, instant: Instant, size: tuple[int, int], window: Window
 ) -> tuple[FloatArray, float]:
     """Return the matrices of `clip_matrices` and the farthest that anything may be from the camera."""
-    view = view_at(scene.camera, scene.animation, frame, fraction, size)
-    local = body_matrices(placement, scene.animation, frame, fraction, view.origin)
+    view = pass_view(scene, instant, size)
+    local = body_matrices(
+        placement, scene.animation, instant.frame, instant.fraction, view.origin, interpolated=instant.interpolated
+    )
     # Frobenius norm: no direction is stretched by more
     reach = np.linalg.norm(local[:, :3, 3], axis=1) + placement.radii * np.linalg.norm(local[:, :3, :3], axis=(1, 2))
     farthest = max(float(reach.max(initial=0.0)), _LEAST_DISTANT)
     camera = np.eye(4)
     camera[:3, :3] = np.stack([view.right, view.up, view.forward])
-    clip = np.repeat((_projection(view, farthest, jitter, margin) @ camera)[None], len(local), axis=0)
+    clip = np.repeat((_projection(view, farthest, instant.jitter, window) @ camera)[None], len(local), axis=0)
     # layer k is nearer by k steps of its distance: only the row of depth changes, never where a point is drawn
     closer = 1.0 - LAYER_STEP * placement.layers
     clip[:, 2] *= (1.0 / closer if view.perspective else closer)[:, None]
@@ -110,11 +139,13 @@ def _compose(
     return out, farthest
 
 
-def _projection(view: View, farthest: float, jitter: tuple[float, float], margin: int) -> FloatArray:
+def _projection(view: View, farthest: float, jitter: tuple[float, float], window: Window) -> FloatArray:
     """Return the (4, 4) matrix from (right, up, forward, 1) to clip space."""
-    across, down = 2 / (view.width + 2 * margin), 2 / (view.height + 2 * margin)
+    across, down = 2 / window.width, 2 / window.height
     sx, sy = across * view.scale, -down * view.scale
-    jx, jy = -across * jitter[0], -down * jitter[1]
+    # where the axis meets the window, differences of whole numbers first: exactly 0 in the middle
+    jx = (view.width - 2 * window.left - window.width) / window.width - across * jitter[0]
+    jy = (view.height - 2 * window.top - window.height) / window.height - down * jitter[1]
     if view.perspective:
         near = _NEAR * farthest
         return np.array([[sx, 0, jx, 0], [0, sy, jy, 0], [0, 0, 0, near], [0, 0, 1, 0]])

@@ -1,8 +1,9 @@
-"""The rasterizer: MSAA, supersampling, mipmapped minification and an accumulation buffer over pixel and time.
+"""The rasterizer: MSAA, supersampling, mipmapped minification and an accumulation buffer over all sample dimensions.
 
 An accumulation pass is one sample index of the shared pattern, the same for all pixels: it draws the whole scene with
-the picture shifted by that sample's place in the pixel, at that sample's time in the shutter. Passes are summed in
-float64 on the host: blending into a float target is no faster, and less exact.
+the picture shifted by that sample's place in the pixel, at that sample's time in the shutter, from its point of the
+lens (`exposures`). Passes are summed in float64 on the host: blending into a float target is no faster, and less exact.
+Pictures larger than the device can draw are drawn in parts.
 """
 
 import weakref
@@ -10,7 +11,7 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from time import perf_counter
 from types import TracebackType
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,18 +19,22 @@ from numpy.typing import ArrayLike, NDArray
 from aliasbench.renderers.frame import Frame, Progress
 from aliasbench.renderers.geometry import build_bodies
 from aliasbench.renderers.raster.context import acquire_context, check_samples
+from aliasbench.renderers.raster.exposures import Exposure, Exposures
+from aliasbench.renderers.raster.filtering import make_optics
 from aliasbench.renderers.raster.graphics import GraphicsContext
 from aliasbench.renderers.raster.guard import Guard
 from aliasbench.renderers.raster.pipeline import SceneBuffers
 from aliasbench.renderers.raster.placement import make_placement
-from aliasbench.renderers.raster.projection import MOST_DISTANT, clip_matrices, depth_rule
-from aliasbench.renderers.raster.targets import Target
-from aliasbench.renderers.sampling.patterns import pattern_frame, sample_set, sampler_code
+from aliasbench.renderers.raster.projection import MOST_DISTANT, Instant, Window, clip_matrices, depth_rule
+from aliasbench.renderers.raster.targets import Target, make_layout
+from aliasbench.renderers.sampling.patterns import sampler_code
+from aliasbench.renderers.sampling.warps import IDENTITY
 from aliasbench.renderers.technique import Technique
-from aliasbench.renderers.unlit import check_unlit
-from aliasbench.scenes.errors import InputError, NotAvailableError
-from aliasbench.scenes.model import Scene
+from aliasbench.scenes.errors import InputError, NotAvailableError, UnsupportedScene
+from aliasbench.scenes.model import FloatArray, Scene
 from aliasbench.scenes.motion import shutter_fraction
+
+_LEAST_WEIGHT = 1e-9  # of a pass, on average: less is rounding
 
 
 def prepare_raster(scene: Scene, technique: Technique, size: tuple[int, int]) -> "RasterScene":
@@ -57,19 +62,31 @@ def prepare_raster(scene: Scene, technique: Technique, size: tuple[int, int]) ->
 
 def _check_available(scene: Scene, technique: Technique) -> None:
     missing = (
-        (technique.filter != "box", f"filter={technique.filter}", "filter=box"),
-        (technique.radius_px != 0.5, f"filter=box,radius={technique.radius_px:g}", "radius=0.5"),
-        (technique.weighting != "samples", f"weighting={technique.weighting}", "weighting=samples"),
         (technique.texture == "anisotropic", "texture=anisotropic", "point, linear, mipmap, trilinear"),
         (technique.post != "none", f"post={technique.post}", "post=none"),
         (technique.alpha_to_coverage, "alpha_to_coverage=on", "alpha_to_coverage=off"),
-        (technique.motion != "exact", f"motion={technique.motion}", "motion=exact"),
     )
     for wanted, feature, available in missing:
         if wanted:
             raise NotAvailableError(f"raster: {feature} is not available yet; available: {available}")
     sampler_code(technique.sampler)
-    check_unlit("raster", scene)
+    _check_drawn(scene)
+
+
+def _check_drawn(scene: Scene) -> None:
+    """Raise UnsupportedScene for what of light the rasterizer does not draw."""
+    if scene.lights:
+        raise UnsupportedScene(f"raster: lights ({len(scene.lights)}) are not drawn; scenes without lights are")
+    if scene.bounces:
+        raise UnsupportedScene(
+            f"raster: diffuse interreflection (bounces = {scene.bounces}) is not drawn; direct light alone is"
+        )
+    for index, surface in enumerate(scene.objects):
+        if surface.material.kind not in ("unlit", "diffuse"):
+            raise UnsupportedScene(
+                f"raster: material {surface.material.kind} (object {surface.name or f'number {index}'}) is not drawn; "
+                "unlit is, and diffuse without lights"
+            )
 
 
 def _check_range(scene: Scene) -> None:
@@ -109,23 +126,33 @@ class RasterScene:
         self, context: GraphicsContext, scene: Scene, technique: Technique, size: tuple[int, int], start: float
     ) -> None:
         self._context, self._scene, self._technique, self._size = context, scene, technique, size
+        self._optics = make_optics(technique)
+        self._layout = make_layout(context, size, technique, self._optics)
         bodies = build_bodies(scene)
         self._placement = make_placement(bodies)
-        self._guard = Guard(scene, self._placement, size)
+        self._parts = [self._make_part(*corner) for corner in self._layout.corners(size)]
         with context.use() as gl, ExitStack() as made:
             context.release_left_over()
-            self._target = Target(context, size, technique, depth_rule(scene.camera))
+            self._target = Target(context, self._layout, technique, depth_rule(scene.camera), self._optics)
             made.callback(self._target.release)
             self._buffers = SceneBuffers(context, scene, bodies, technique)
-            # compiles the kernel at the first call of a process: that is no rendering
-            sample_set(technique.sampler, technique.passes)
+            # compiles the kernels at the first call of a process: that is no rendering
+            Exposures(technique, self._optics, 0, 0)
             gl.finish()
             context.check("uploading the scene")
             made.pop_all()
         # frees nothing itself: the collector may run while another context is current
         self._forgotten = weakref.finalize(self, _leave, context, self._buffers.release, self._target.release)
         self._forgotten.atexit = False
+        self._sums: FloatArray | None = None
         self._setup_seconds = perf_counter() - start
+
+    def _make_part(self, left: int, top: int) -> "_Part":
+        ssaa, margin = self._layout.ssaa, self._layout.margin
+        window = Window(left * ssaa - margin, top * ssaa - margin, *self._layout.full)
+        width, height = (min(p, s - c) for p, s, c in zip(self._layout.part, self._size, (left, top), strict=True))
+        guard = Guard(self._scene, self._placement, (window.width, window.height))
+        return _Part(window, (slice(top, top + height), slice(left, left + width)), guard)
 
     def render(self, frame: int = 0, seed: int = 0, progress: Progress | None = None) -> Frame:
         """Return frame number `frame`; `progress`, where given, is told the share of its passes that are done.
@@ -135,49 +162,90 @@ class RasterScene:
         GraphicsError
             If OpenGL reports an error.
         InputError
-            If the scene reaches farther from the camera in that frame than float32 can hold.
+            If the scene reaches farther from the camera in that frame than float32 can hold, or no sample lies under
+            the filter.
         RuntimeError
             If the prepared scene is closed.
         """
         start = perf_counter()
         t = self._technique
-        passes = sample_set(t.sampler, t.passes, seed=seed, frame=pattern_frame(t.reseed, frame))
+        exposures = Exposures(t, self._optics, seed, frame)
         pixels = np.empty((self._size[1], self._size[0], 3), np.float32)
-        total = np.zeros(pixels.shape) if t.passes > 1 else None
         with self._context.use():
             # asked inside, since another thread may close it meanwhile
             if not self._forgotten.alive:
                 raise RuntimeError("this prepared scene is closed; prepare it again to render")
-            for number, (x, y, time, *_) in enumerate(passes):
-                self._draw_pass(frame, 0.5 if t.time == "center" else time, (x - 0.5, y - 0.5), pixels)
-                if total is not None:
-                    np.add(total, pixels, out=total)
-                if progress is not None:
-                    progress((number + 1) / t.passes)
+            for number, part in enumerate(self._parts):
+                done = None if progress is None else _share(progress, number, len(self._parts))
+                self._render_part(part, frame, exposures, pixels, done)
             self._context.check("drawing a frame")
-        if total is not None:
-            np.multiply(total, 1.0 / t.passes, out=pixels, casting="same_kind")
         samples = self._size[0] * self._size[1] * t.passes * t.msaa * t.ssaa**2
         return Frame(pixels, perf_counter() - start, self._setup_seconds, samples)
 
-    def _draw_pass(self, frame: int, time: float, jitter: tuple[float, float], pixels: NDArray[np.float32]) -> None:
-        """Draw one pass into `pixels`."""
-        matrices = clip_matrices(
-            self._scene,
-            self._placement,
-            size=self._target.size,
-            frame=frame,
-            fraction=shutter_fraction(self._scene.animation, time),
-            jitter=jitter,
-            margin=self._target.margin,
+    def _render_part(
+        self,
+        part: "_Part",
+        frame: int,
+        exposures: Exposures,
+        pixels: NDArray[np.float32],
+        progress: Progress | None,
+    ) -> None:
+        """Draw all passes of a part of the picture and write its pixels."""
+        whole = len(self._parts) == 1
+        drawn = pixels if whole else np.empty((self._layout.part[1], self._layout.part[0], 3), np.float32)
+        sums = self._cleared_sums(drawn) if len(exposures) > 1 else None
+        weights = 0.0
+        for number in range(len(exposures)):
+            exposure = exposures[number]
+            weight = exposure.weight * self._draw_pass(part, frame, exposure)
+            self._target.read_into(drawn)
+            if sums is not None:
+                if exposure.weight != 1.0:
+                    np.multiply(drawn, np.float32(exposure.weight), out=drawn)
+                np.add(sums, drawn, out=sums)
+            weights += weight
+            if progress is not None:
+                progress((number + 1) / len(exposures))
+        if self._optics.warp.code != IDENTITY:
+            weights = float(len(exposures))  # signed samples of a distribution: their mean, not their quotient
+        if not abs(weights) > _LEAST_WEIGHT * len(exposures):
+            raise InputError(
+                f"filter={self._technique.filter},radius={self._technique.radius_px:g}: no sample lies under so narrow "
+                "a filter; use passes alone, whose places are drawn under it"
+            )
+        if sums is not None:
+            np.multiply(sums, 1.0 / weights, out=drawn, casting="same_kind")
+        elif weights != 1.0 or exposures[0].weight != 1.0:
+            np.multiply(drawn, np.float32(exposures[0].weight / weights), out=drawn)
+        if not whole:
+            height, width = (s.stop - s.start for s in part.place)
+            pixels[part.place] = drawn[:height, :width]
+
+    def _cleared_sums(self, like: NDArray[np.float32]) -> FloatArray:
+        if self._sums is None:
+            self._sums = np.empty(like.shape)
+        self._sums.fill(0.0)
+        return self._sums
+
+    def _draw_pass(self, part: "_Part", frame: int, exposure: Exposure) -> float:
+        """Draw one pass of a part; return the sum of its samples' weights."""
+        instant = Instant(
+            frame,
+            shutter_fraction(self._scene.animation, exposure.time),
+            exposure.jitter,
+            exposure.lens,
+            self._technique.motion == "matrix",
         )
-        far = self._guard.far_objects(matrices)
+        ssaa = self._layout.ssaa
+        drawn = (self._size[0] * ssaa, self._size[1] * ssaa)
+        matrices = clip_matrices(self._scene, self._placement, instant, size=drawn, window=part.window)
+        far = part.guard.far_objects(matrices)
         self._target.begin(self._scene.background)
         if far.any():
-            self._buffers.draw(matrices, self._guard.cut(matrices, far), far)
+            self._buffers.draw(matrices, part.guard.cut(matrices, far), far)
         else:
             self._buffers.draw(matrices)
-        self._target.read_into(pixels, jitter)
+        return self._target.finish(exposure.jitter)
 
     def close(self) -> None:
         """Free what the scene holds on the device; a second call does nothing."""
@@ -193,3 +261,16 @@ class RasterScene:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+
+class _Part(NamedTuple):
+    """A part of the picture: what is drawn, which pixels it is (rows, columns), and what is far in it."""
+
+    window: Window
+    place: tuple[slice, slice]
+    guard: Guard
+
+
+def _share(progress: Progress, number: int, count: int) -> Progress:
+    """Return what tells the progress of one of `count` equal parts of the work."""
+    return lambda done: progress((number + done) / count)

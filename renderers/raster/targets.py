@@ -1,38 +1,28 @@
-"""What a pass is drawn to, and how its samples become pixels: 32-bit float colour and depth, averaged in linear light.
+"""What a pass is drawn to and read from: 32-bit float colour and depth, made into pixels in linear light (`stages`).
 
-With hardware samples and moved passes together a plain average would widen the filter: sample k of a pass lies at
-p_k + jitter, up to half a pixel outside its pixel, and the mean over all jitters would be the box filter convolved with
-the device's pattern (on a star, 256 samples so made had the error of 9). The pattern does not depend on the pixel, so
-a sample that leaves its pixel on one side belongs to the neighbour there, and the neighbour on the other side has the
-one to fill its place: `_Gather` takes it from there. All samples of a pixel are then inside it, at p_k + jitter
-modulo the pixel, and their mean over all jitters is the box filter exactly.
-
-Supersampling draws a picture k times as wide and high, whose pixels play the part of sub-pixels in all of this, and
-averages k x k of them on the device.
+Supersampling draws a picture k times as wide and high, whose pixels play the part of sub-pixels throughout. Samples
+that count in other pixels than their own need pixels around the picture: the target has a margin for them.
 """
 
 from contextlib import ExitStack
-from typing import Any, Protocol
+from typing import NamedTuple
 
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from aliasbench.renderers.raster.graphics import DEPTH32F, GraphicsContext, GraphicsError, read_shader
+from aliasbench.renderers.raster.filtering import Optics
+from aliasbench.renderers.raster.graphics import DEPTH32F, GraphicsContext, GraphicsError
 from aliasbench.renderers.raster.projection import DepthRule
+from aliasbench.renderers.raster.stages import Axis, Gather, Image, Reduce, Resolve, Stage, Taps
 from aliasbench.renderers.technique import Technique
 from aliasbench.scenes.errors import InputError
 from aliasbench.scenes.model import FloatArray
 
 # 32-bit RGBA and depth
 _BYTES_PER_SAMPLE = 20
-
-
-def wrapped_positions(positions: FloatArray, jitter: tuple[float, float]) -> tuple[FloatArray, NDArray[np.int32]]:
-    """Return where in its pixel every hardware sample lies once moved, (n, 2), and how many pixels off that is."""
-    moved = positions + np.asarray(jitter)
-    whole = np.floor(moved)
-    return moved - whole, whole.astype(np.int32)
+# Of one target: larger pictures are drawn in parts.
+_MOST_BYTES = 1 << 30
 
 
 def ssaa_positions(ssaa: int, jitter: tuple[float, float]) -> FloatArray:
@@ -42,66 +32,120 @@ def ssaa_positions(ssaa: int, jitter: tuple[float, float]) -> FloatArray:
     return out
 
 
-class Target:
-    """What passes are drawn to and read from.
+class Layout(NamedTuple):
+    """How a picture is cut into parts that a device can draw.
 
     Attributes
     ----------
-    size : (width, height)
-        Of the picture that is drawn: `ssaa` times the one that is read.
+    part : (width, height)
+        Of every part, in pixels of the picture; the last ones may reach beyond it.
     margin : int
-        How many pixels the target is larger than that on each side.
+        Drawn pixels around a part.
+    ssaa : int
+        Drawn pixels a pixel, in each direction.
     """
 
-    def __init__(self, context: GraphicsContext, size: tuple[int, int], technique: Technique, rule: DepthRule) -> None:
-        self.size = (size[0] * technique.ssaa, size[1] * technique.ssaa)
-        moved, samples = technique.sampler != "center", technique.msaa
-        self.margin = 1 if moved and samples > 1 else 0
-        full = (self.size[0] + 2 * self.margin, self.size[1] + 2 * self.margin)
-        limit = min(context.max_size, context.max_texture_size)
-        if max(full) > limit:
-            larger = f" with ssaa={technique.ssaa}" if technique.ssaa > 1 else ""
-            most = limit // technique.ssaa - 2 * self.margin
-            raise InputError(f"size {size[0]}x{size[1]}{larger}: this device ({context.renderer}) draws at most {most}")
-        self._stages: list[_Stage] = []
+    part: tuple[int, int]
+    margin: int
+    ssaa: int
+
+    @property
+    def full(self) -> tuple[int, int]:
+        """Width and height of what is drawn of a part."""
+        return (self.part[0] * self.ssaa + 2 * self.margin, self.part[1] * self.ssaa + 2 * self.margin)
+
+    def corners(self, size: tuple[int, int]) -> list[tuple[int, int]]:
+        """Return (left, top) of all parts of a picture."""
+        return [(x, y) for y in range(0, size[1], self.part[1]) for x in range(0, size[0], self.part[0])]
+
+
+def make_layout(context: GraphicsContext, size: tuple[int, int], technique: Technique, optics: Optics) -> Layout:
+    """Return how to draw a picture: at once where the device can.
+
+    Raises
+    ------
+    InputError
+        If the margin or the sub-pixels alone are more than the device can draw.
+    """
+    samples, ssaa = technique.msaa, technique.ssaa
+    moved = technique.sampler != "center" and samples > 1
+    margin = optics.margin * ssaa if optics.is_weighted else 0
+    if moved:
+        margin += ssaa if optics.is_weighted else 1
+    limit = (min(context.max_size, context.max_texture_size) - 2 * margin) // ssaa
+    if limit < 1:
+        raise InputError(
+            f"ssaa={ssaa} with {margin} drawn pixels around: this device ({context.renderer}) draws at most "
+            f"{min(context.max_size, context.max_texture_size)} pixels across"
+        )
+    width, height = min(size[0], limit), min(size[1], limit)
+    while True:
+        layout = Layout((width, height), margin, ssaa)
+        full = layout.full
+        if full[0] * full[1] * samples * _BYTES_PER_SAMPLE <= _MOST_BYTES or width * height == 1:
+            return layout
+        width, height = (-(-width // 2), height) if width > height else (width, -(-height // 2))
+
+
+class Target:
+    """What parts of a picture are drawn to and read from."""
+
+    def __init__(
+        self, context: GraphicsContext, layout: Layout, technique: Technique, rule: DepthRule, optics: Optics
+    ) -> None:
+        self._stages: list[Stage] = []
+        full, samples = layout.full, technique.msaa
         with ExitStack() as made:
             try:
-                self._surface = _Surface(context, full, samples, rule, made)
-                self._add_stages(context, size, technique, made)
+                self._surface = Surface(context, full, samples, rule, made)
+                self._add_stages(context, layout, technique, optics, made)
                 context.check("making the targets")
             except (moderngl.Error, GraphicsError) as error:
                 # what a driver says of lacking memory: an incomplete framebuffer, or an error of its own
                 context.gl.clear_errors()
                 taken = full[0] * full[1] * samples * _BYTES_PER_SAMPLE / 2**30
                 raise InputError(
-                    f"size {size[0]}x{size[1]}: this device ({context.renderer}) cannot hold {samples} sample"
-                    f"{'s'[: samples > 1]} a pixel of {full[0]}x{full[1]} pixels ({taken:.1f} GiB: {error}); "
+                    f"size {layout.part[0]}x{layout.part[1]}: this device ({context.renderer}) cannot hold {samples} "
+                    f"sample{'s'[: samples > 1]} a pixel of {full[0]}x{full[1]} pixels ({taken:.1f} GiB: {error}); "
                     f"choose a smaller size{' or msaa' * (samples > 1)}{' or ssaa' * (technique.ssaa > 1)}"
                 ) from None
             made.pop_all()
 
     def _add_stages(
-        self, context: GraphicsContext, size: tuple[int, int], technique: Technique, made: ExitStack
+        self, context: GraphicsContext, layout: Layout, technique: Technique, optics: Optics, made: ExitStack
     ) -> None:
-        samples = technique.msaa
-        if self.margin:
-            self._stages.append(_Gather(context, self._surface, self.size, samples, self.margin, made))
-        elif samples > 1:
-            self._stages.append(_Resolve(context, self._surface, self.size, made))
-        if technique.ssaa > 1:
-            source = self._stages[-1].output if self._stages else self._surface
-            self._stages.append(_Reduce(context, source, size, technique.ssaa, made))
-        self._last = self._stages[-1].output if self._stages else self._surface
+        samples, ssaa, margin, part = technique.msaa, technique.ssaa, layout.margin, layout.part
+        source: Image = self._surface
+        if optics.is_weighted and (samples > 1 or not optics.spec.kind.separable):
+            self._stages.append(Taps(context, source, part, samples, optics, ssaa, margin, made))
+        elif optics.is_weighted:
+            self._stages.append(Axis(context, source, (part[0], layout.full[1]), 0, optics, ssaa, made))
+            self._stages.append(Axis(context, self._stages[-1].output, part, 1, optics, ssaa, made))
+        else:
+            drawn = (part[0] * ssaa, part[1] * ssaa)
+            if margin:
+                self._stages.append(Gather(context, source, drawn, samples, margin, made))
+            elif samples > 1:
+                self._stages.append(Resolve(context, source, drawn, made))
+            if ssaa > 1:
+                source = self._stages[-1].output if self._stages else source
+                self._stages.append(Reduce(context, source, part, ssaa, made))
+        self.output: Image = self._stages[-1].output if self._stages else self._surface
 
     def begin(self, background: tuple[float, float, float]) -> None:
         """Clear the target and make it the one drawn to."""
         self._surface.begin(background)
 
-    def read_into(self, pixels: NDArray[np.float32], jitter: tuple[float, float]) -> None:
-        """Write the picture of a pass, drawn with that jitter, into an (h, w, 3) array."""
+    def finish(self, jitter: tuple[float, float]) -> float:
+        """Make the pixels of a pass, drawn with that jitter, in `output`; return the sum of its samples' weights."""
+        weight = 1.0
         for stage in self._stages:
-            stage.run(jitter)
-        self._last.framebuffer.read_into(pixels, components=3, dtype="f4")
+            weight *= stage.run(jitter)
+        return weight
+
+    def read_into(self, pixels: NDArray[np.float32]) -> None:
+        """Write `output` into an (h, w, 3) array."""
+        self.output.framebuffer.read_into(pixels, components=3, dtype="f4")
 
     def release(self) -> None:
         """Free everything."""
@@ -110,21 +154,7 @@ class Target:
         self._surface.release()
 
 
-class _Image:
-    """A picture of one sample a pixel; `made` frees what there is already when the rest cannot be made."""
-
-    def __init__(self, context: GraphicsContext, size: tuple[int, int], made: ExitStack) -> None:
-        self.color: Any = context.gl.texture(size, 4, dtype="f4")
-        made.callback(self.color.release)
-        self.framebuffer = context.gl.framebuffer([self.color])
-        made.callback(self.framebuffer.release)
-
-    def release(self) -> None:
-        self.framebuffer.release()
-        self.color.release()
-
-
-class _Surface(_Image):
+class Surface(Image):
     """Colour and depth of one size and number of samples."""
 
     def __init__(
@@ -143,6 +173,7 @@ class _Surface(_Image):
         made.callback(self.framebuffer.release)
 
     def begin(self, background: tuple[float, float, float]) -> None:
+        """Clear it and make it the one drawn to."""
         self.framebuffer.use()
         gl = self.framebuffer.ctx
         gl.enable_only(moderngl.DEPTH_TEST)
@@ -150,92 +181,6 @@ class _Surface(_Image):
         self.framebuffer.clear(*background, 1.0, depth=self._rule.empty)
 
     def release(self) -> None:
+        """Free it."""
         super().release()
         self._depth.release()
-
-
-class _Stage(Protocol):
-    """One step from samples to pixels; its result is in `output`."""
-
-    output: _Image
-
-    def run(self, jitter: tuple[float, float], /) -> None: ...
-
-    def release(self) -> None: ...
-
-
-class _Resolve:
-    """The hardware's own average of the samples of each pixel."""
-
-    def __init__(self, context: GraphicsContext, source: _Image, size: tuple[int, int], made: ExitStack) -> None:
-        self._context, self._source = context, source
-        self.output = _Image(context, size, made)
-
-    def run(self, _jitter: tuple[float, float], /) -> None:
-        self._context.resolve(self._source.framebuffer, self.output.framebuffer)
-
-    def release(self) -> None:
-        self.output.release()
-
-
-class _ScreenStage:
-    """A fragment shader over every pixel of the output, reading the source."""
-
-    def __init__(
-        self,
-        context: GraphicsContext,
-        source: _Image,
-        size: tuple[int, int],
-        made: ExitStack,
-        shader: str,
-        **constants: int,
-    ) -> None:
-        self._source = source
-        self.output = _Image(context, size, made)
-        lines = ["#version 330 core", *(f"#define {name} {value}" for name, value in constants.items()), "#line 1\n"]
-        self._program = context.program(
-            *("\n".join(lines) + read_shader(name) for name in ("screen.vert.glsl", shader))
-        )
-        self._screen = context.gl.vertex_array(self._program, [])
-        made.callback(self._screen.release)
-
-    def run(self, _jitter: tuple[float, float], /) -> None:
-        self.output.framebuffer.use()
-        self.output.framebuffer.ctx.enable_only(moderngl.NOTHING)
-        self._source.color.use(0)
-        self._program["source"] = 0
-        self._screen.render(moderngl.TRIANGLES, vertices=3)
-
-    def release(self) -> None:
-        self._screen.release()
-        self.output.release()
-
-
-class _Gather(_ScreenStage):
-    """The average of the hardware samples that lie in a pixel, whichever pixel they were drawn for."""
-
-    def __init__(
-        self,
-        context: GraphicsContext,
-        source: _Image,
-        size: tuple[int, int],
-        samples: int,
-        margin: int,
-        made: ExitStack,
-    ) -> None:
-        super().__init__(context, source, size, made, "gather.frag.glsl", SAMPLES=samples)
-        self._positions, self._margin = context.sample_positions(samples), margin
-
-    def run(self, jitter: tuple[float, float], /) -> None:
-        _, off = wrapped_positions(self._positions, jitter)
-        self._program["offsets"] = [tuple(p) for p in (self._margin - off).tolist()]
-        super().run(jitter)
-
-
-class _Reduce(_ScreenStage):
-    """The average of k x k pixels."""
-
-    def __init__(
-        self, context: GraphicsContext, source: _Image, size: tuple[int, int], ssaa: int, made: ExitStack
-    ) -> None:
-        super().__init__(context, source, size, made, "reduce.frag.glsl", SSAA=ssaa)

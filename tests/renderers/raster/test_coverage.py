@@ -5,7 +5,8 @@ import pytest
 
 from aliasbench.renderers.catalog import render
 from aliasbench.renderers.raster.context import acquire_context, sample_positions
-from aliasbench.renderers.raster.targets import ssaa_positions, wrapped_positions
+from aliasbench.renderers.raster.stages import wrapped_positions
+from aliasbench.renderers.raster.targets import ssaa_positions
 from aliasbench.renderers.sampling.patterns import sample_set
 
 pytestmark = pytest.mark.usefixtures("gl_checked")
