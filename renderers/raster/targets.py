@@ -78,13 +78,19 @@ def make_layout(context: GraphicsContext, size: tuple[int, int], technique: Tech
             f"ssaa={ssaa} with {margin} drawn pixels around: this device ({context.renderer}) draws at most "
             f"{min(context.max_size, context.max_texture_size)} pixels across"
         )
-    width, height = min(size[0], limit), min(size[1], limit)
+    # parts of even sizes: drivers take derivatives over 2 x 2 pixels, which then are the same as in one piece
+    width, height = (side if side <= limit else max(limit & ~1, 1) for side in size)
     while True:
         layout = Layout((width, height), margin, ssaa)
         full = layout.full
         if full[0] * full[1] * samples * _BYTES_PER_SAMPLE <= _MOST_BYTES or width * height == 1:
             return layout
-        width, height = (-(-width // 2), height) if width > height else (width, -(-height // 2))
+        width, height = (_half(width), height) if width > height else (width, _half(height))
+
+
+def _half(side: int) -> int:
+    """Return half of a side, rounded up to an even number where there is one below it."""
+    return min(2 * -(-side // 4), side - 1)
 
 
 class Target:

@@ -7,7 +7,7 @@ from aliasbench.renderers.catalog import prepare, render
 from aliasbench.renderers.geometry import build_bodies
 from aliasbench.renderers.raster.guard import Guard
 from aliasbench.renderers.raster.placement import make_placement
-from aliasbench.renderers.raster.projection import clip_matrices
+from aliasbench.renderers.raster.projection import Instant, Window, clip_matrices
 from aliasbench.scenes.errors import InputError
 from aliasbench.scenes.model import Camera, Checker, Motion, Spin
 
@@ -172,7 +172,9 @@ def test_ordinary_objects_are_left_to_the_device(make):
             scene = make.star(camera=camera, motion=motion)
             placement = make_placement(build_bodies(scene))
             size = (2048, 2048)
-            matrices = clip_matrices(scene, placement, size=size, frame=0, fraction=0.0, jitter=(0.2, 0.1))
+            matrices = clip_matrices(
+                scene, placement, Instant(0, 0.0, (0.2, 0.1)), size=size, window=Window(0, 0, *size)
+            )
             assert not Guard(scene, placement, size).far_objects(matrices).any()
 
 

@@ -8,7 +8,7 @@ import pytest
 from aliasbench.renderers.catalog import prepare, render
 from aliasbench.renderers.geometry import build_bodies
 from aliasbench.renderers.raster.placement import body_matrices, make_placement
-from aliasbench.renderers.raster.projection import clip_matrices
+from aliasbench.renderers.raster.projection import Instant, Window, clip_matrices
 from aliasbench.renderers.sampling.patterns import sample_set
 from aliasbench.scenes.model import Camera, Motion, Spin
 from aliasbench.scenes.motion import object_matrix
@@ -112,11 +112,9 @@ def test_clip_matrices_agree_with_the_camera_to_float64(make):
         (clip,) = clip_matrices(
             scene,
             make_placement([body]),
+            Instant(3, 0.4, jitter),
             size=SIZE,
-            frame=3,
-            fraction=0.4,
-            jitter=jitter,
-            margin=margin,
+            window=Window(-margin, -margin, SIZE[0] + 2 * margin, SIZE[1] + 2 * margin),
         )
         matrix = object_matrix(SPIN, scene.animation, 3, 0.4)
         world = (body.vertices + body.origin) @ matrix[:3, :3].T + matrix[:3, 3]
