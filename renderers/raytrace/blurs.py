@@ -7,8 +7,8 @@ from aliasbench.renderers.kernel_parts import called
 from aliasbench.renderers.raytrace.film import RUN_LANE, RUN_LANES, RUN_PIXEL, Film, IntArray, run_address
 from aliasbench.renderers.raytrace.lanes import LANES, LENS_X, LENS_Y, PX, PY, TIME
 from aliasbench.renderers.raytrace.positions import KeyArray, fill_line, fill_plane
-from aliasbench.renderers.raytrace.scattering import disc_point
 from aliasbench.renderers.sampling.bits import hidden
+from aliasbench.renderers.sampling.discs import disc_point
 from aliasbench.renderers.sampling.patterns import DIM_LENS, DIM_TIME, Pattern
 from aliasbench.scenes.model import FloatArray
 

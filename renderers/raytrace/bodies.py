@@ -39,7 +39,7 @@ from aliasbench.renderers.raytrace.lanes import (
     RAY_TFAR,
     TIME,
 )
-from aliasbench.renderers.raytrace.trig import cos_turns, sin_turns
+from aliasbench.renderers.sampling.trig import cos_turns, sin_turns
 from aliasbench.scenes.model import Animation, FloatArray, Motion, Scene
 from aliasbench.scenes.motion import object_matrix, spin_turns
 from aliasbench.scenes.projection import View

@@ -13,7 +13,7 @@ colour, by which a path's throughput is multiplied.
 import numpy as np
 from numba import njit
 
-from aliasbench.renderers.raytrace.trig import cos_turns, sin_turns
+from aliasbench.renderers.sampling.discs import disc_point
 from aliasbench.scenes.model import FloatArray, Vec3
 
 SHORTEST_NM, LONGEST_NM = 400.0, 700.0
@@ -32,21 +32,6 @@ def normalized(x: float, y: float, z: float) -> Vec3:
     """Return the vector with length 1; the zero vector as it is."""
     scale = 1.0 / np.sqrt(max(x * x + y * y + z * z, _TINY))
     return x * scale, y * scale, z * scale
-
-
-@njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)
-def disc_point(u: float, v: float) -> tuple[float, float]:
-    """Return the point of the unit disc that belongs to one of the unit square (Shirley & Chiu 1997).
-
-    Squares about the middle become circles of the same half-width and areas are multiplied by pi everywhere: points as
-    well spread as in the square. Neighbours stay neighbours, across the middle too.
-    """
-    a, b = 2.0 * u - 1.0, 2.0 * v - 1.0
-    is_wide = abs(a) > abs(b)
-    radius, other = (a, b) if is_wide else (b, a)
-    turns = 0.125 * other / (radius if radius != 0.0 else 1.0)
-    along, across = radius * cos_turns(turns), radius * sin_turns(turns)
-    return (along, across) if is_wide else (across, along)
 
 
 @njit(cache=True, forceinline=True, error_model="numpy", _nrt=False)

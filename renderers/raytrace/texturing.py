@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from aliasbench.renderers.kernel_parts import called, inlined
 from aliasbench.renderers.raytrace.ewa import ewa_color
 from aliasbench.renderers.raytrace.lanes import BLUE, GREEN, LANES, LOD, R_RIGHT, R_UP, RED, S_RIGHT, S_UP, U, V
-from aliasbench.renderers.raytrace.trig import cos_turns
 from aliasbench.renderers.sampling.rare import compiled_if_rare
+from aliasbench.renderers.sampling.trig import cos_turns
 from aliasbench.scenes.model import FloatArray
 
 if TYPE_CHECKING:

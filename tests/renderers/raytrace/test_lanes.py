@@ -17,7 +17,6 @@ from aliasbench.renderers.raytrace.positions import (
     fill_times,
     orders_size,
 )
-from aliasbench.renderers.raytrace.trig import cos_turns, sin_turns
 from aliasbench.renderers.sampling.bluenoise import tile_level
 from aliasbench.renderers.sampling.hashing import SHARED, frame_key
 from aliasbench.renderers.sampling.patterns import (
@@ -32,6 +31,7 @@ from aliasbench.renderers.sampling.patterns import (
     make_pattern,
     sample_set,
 )
+from aliasbench.renderers.sampling.trig import cos_turns, sin_turns
 from aliasbench.scenes.model import FloatArray
 
 # bluenoise has a pattern of its own for each pixel
