@@ -143,7 +143,10 @@ class Reduce(ScreenStage):
     def __init__(
         self, context: GraphicsContext, source: Image, size: tuple[int, int], ssaa: int, made: ExitStack
     ) -> None:
-        super().__init__(context, source, size, made, "reduce.frag.glsl", SSAA=ssaa)
+        halved = ssaa % 2 == 0 and all(side & (side - 1) == 0 for side in source.color.size)
+        super().__init__(context, source, size, made, "reduce.frag.glsl", SSAA=ssaa, BLOCK=2 if halved else 1)
+        if halved:
+            source.color.filter = (moderngl.LINEAR, moderngl.LINEAR)
 
 
 class Axis(ScreenStage):
