@@ -17,15 +17,16 @@ from aliasbench.scenes.errors import InputError
 from aliasbench.scenes.model import Checker, FloatArray, Grating, ImageTexture, Scene, ZonePlate
 from aliasbench.scenes.textures import scene_chain
 
-Uniform = float | tuple[float, ...]
+Uniform = float | int | tuple[float, ...]
 
 KINDS = ("PLAIN", "IMAGE", "CHECKER", "SINE", "SQUARE", "ZONE_PLATE")
-MODES = ("POINT", "LINEAR", "MIPMAP")
+MODES = ("POINT", "LINEAR", "MIPMAP", "ANISOTROPIC")
 _FILTERS = {
     "point": (moderngl.NEAREST, moderngl.NEAREST),
     "linear": (moderngl.LINEAR, moderngl.LINEAR),
     "mipmap": (moderngl.LINEAR_MIPMAP_NEAREST, moderngl.LINEAR),
     "trilinear": (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR),
+    "anisotropic": (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR),
 }
 
 
@@ -43,6 +44,8 @@ class Shading:
         Whether whole numbers may be taken off those coordinates.
     uniforms : dict
     image : moderngl.Texture or None
+    is_coverage : bool
+        Whether alpha says how many hardware samples a fragment covers, and none is discarded.
     """
 
     kind: str
@@ -51,6 +54,7 @@ class Shading:
     periodic: bool
     uniforms: dict[str, Uniform] = field(default_factory=dict)
     image: moderngl.Texture | None = None
+    is_coverage: bool = False
 
 
 def chosen_lod_bias(technique: Technique) -> float:
@@ -89,13 +93,16 @@ def make_shading(gl: moderngl.Context, scene: Scene, name: str | None, technique
     image.filter = _FILTERS[technique.texture]
     image.repeat_x = image.repeat_y = True
     cutoff = texture.alpha_cutoff if isinstance(texture, ImageTexture) else None
-    mode = technique.texture.upper() if exact else "MIPMAP"
+    mode = "MIPMAP" if technique.texture == "trilinear" else technique.texture.upper()
     uniforms: dict[str, Uniform] = {
         "alpha_cutoff": -math.inf if cutoff is None else cutoff,
         # the shader sees sub-pixels; the footprint that the bias shifts is the pixel's
         "lod_bias": chosen_lod_bias(technique) + math.log2(technique.ssaa),
+        "anisotropy": technique.anisotropy,
     }
-    return Shading("IMAGE", mode, chain.uv_matrix, True, uniforms, image)
+    # no alpha is below a cutoff of 0
+    is_coverage = technique.alpha_to_coverage and cutoff is not None and cutoff > 0.0
+    return Shading("IMAGE", mode, chain.uv_matrix, True, uniforms, image, is_coverage)
 
 
 def _make_analytic(texture: Checker | Grating | ZonePlate) -> Shading:

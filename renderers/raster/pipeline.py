@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aliasbench.renderers.geometry import Body
+from aliasbench.renderers.raster.alpha_coverage import ALPHA_TO_COVERAGE, coverage_excess
 from aliasbench.renderers.raster.graphics import GraphicsContext, read_shader
 from aliasbench.renderers.raster.guard import BoolArray, Pieces
 from aliasbench.renderers.raster.minification import (
@@ -45,7 +46,8 @@ class _Batch:
 def _shader(name: str, shading: Shading) -> str:
     names = [*KINDS, *MODES]
     lines = ["#version 330 core", *(f"#define {n} {i}" for i, n in enumerate(names))]
-    lines += [f"#define KIND {shading.kind}", f"#define MODE {shading.mode}", "#line 1"]
+    lines += [f"#define KIND {shading.kind}", f"#define MODE {shading.mode}"]
+    lines += [f"#define COVERAGE {int(shading.is_coverage)}", "#line 1"]
     return "\n".join(lines) + "\n" + read_shader(name)
 
 
@@ -70,6 +72,10 @@ class SceneBuffers:
             if chosen.any():
                 self._batches.append(self._make_batch(triangles[chosen], surfaces[chosen], shading))
         self._shadings = tuple(shadings.values())
+        if any(s.is_coverage for s in self._shadings):
+            excess = coverage_excess(context, technique.msaa)
+            for shading in self._shadings:
+                shading.uniforms["coverage_excess"] = excess
         # one more matrix than bodies: that of the pieces
         count = len(bodies) + 1
         rows = -(-count // BODIES_PER_ROW)
@@ -112,11 +118,15 @@ class SceneBuffers:
                     program[name] = value
             if batch.shading.image is not None:
                 batch.shading.image.use(1)
+            if batch.shading.is_coverage:
+                self._context.gl.enable_direct(ALPHA_TO_COVERAGE)
             count = len(batch.triangles) if far is None else int(np.count_nonzero(~far[batch.owners]))
             if count:
                 batch.array.render(moderngl.TRIANGLES, vertices=3 * count)
             if pieces is not None:
                 self._draw_pieces(batch, pieces, body=len(matrices) - 1)
+            if batch.shading.is_coverage:
+                self._context.gl.disable_direct(ALPHA_TO_COVERAGE)
 
     def _leave_out(self, far: BoolArray | None) -> None:
         """Make the index buffers those of all objects but the far ones."""

@@ -61,11 +61,7 @@ def prepare_raster(scene: Scene, technique: Technique, size: tuple[int, int]) ->
 
 
 def _check_available(scene: Scene, technique: Technique) -> None:
-    missing = (
-        (technique.texture == "anisotropic", "texture=anisotropic", "point, linear, mipmap, trilinear"),
-        (technique.post != "none", f"post={technique.post}", "post=none"),
-        (technique.alpha_to_coverage, "alpha_to_coverage=on", "alpha_to_coverage=off"),
-    )
+    missing = ((technique.post != "none", f"post={technique.post}", "post=none"),)
     for wanted, feature, available in missing:
         if wanted:
             raise NotAvailableError(f"raster: {feature} is not available yet; available: {available}")

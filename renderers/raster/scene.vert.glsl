@@ -12,6 +12,7 @@ in int body;
 flat out vec3 surface_color;
 out vec2 center_coordinate;
 centroid out vec2 coordinate;
+centroid out float centroid_w;
 
 void main() {
     ivec2 at = ivec2(4 * (body % BODIES_PER_ROW), body / BODIES_PER_ROW);
@@ -24,4 +25,5 @@ void main() {
     surface_color = color;
     center_coordinate = texcoord;
     coordinate = texcoord;
+    centroid_w = gl_Position.w;
 }

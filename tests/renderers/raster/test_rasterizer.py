@@ -73,9 +73,7 @@ def test_forgotten_scenes_are_freed_by_the_next(make):
 @pytest.mark.parametrize(
     ("technique", "feature"),
     [
-        ("raster:texture=anisotropic", "texture=anisotropic"),
         ("raster:post=fxaa", "post=fxaa"),
-        ("raster:msaa=4,alpha_to_coverage=on", "alpha_to_coverage=on"),
     ],
 )
 def test_features_that_are_not_there_yet_say_what_is(make, technique, feature):
