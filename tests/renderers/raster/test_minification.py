@@ -24,7 +24,15 @@ TEXELS = (1024, 256)  # across, up
 LAST = 10.0  # level of one texel
 # Levels blend with at least 8 bits on any device (GL_SUBTEXEL_BITS says 4 or more; all have 8).
 FRACTION = 2.0**-8
-MODES = ("point", "linear", "mipmap", "trilinear", "anisotropic", "anisotropic,anisotropy=2", "anisotropic,anisotropy=64")
+MODES = (
+    "point",
+    "linear",
+    "mipmap",
+    "trilinear",
+    "anisotropic",
+    "anisotropic,anisotropy=2",
+    "anisotropic,anisotropy=64",
+)
 
 
 @pytest.fixture
