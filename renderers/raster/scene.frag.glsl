@@ -4,10 +4,14 @@
 
 flat in vec3 surface_color;
 in vec2 center_coordinate;       // at the pixel's centre: differs as it should, but may lie outside the surface
-centroid in vec2 coordinate;     // inside the surface wherever part of a pixel is covered
-centroid in float centroid_w;      // clip-space w there
+centroid in vec4 centroid_place; // inside the surface wherever part of a pixel is covered: coordinate, 1, clip-space w
 
 out vec4 radiance;
+
+// Mesa's software device interpolates centroid inputs over w, but multiplies by the w of the pixel's centre. The same
+// factor is in the interpolated 1, so that the quotient is right on every device.
+vec2 coordinate;
+float coordinate_w;
 
 #if KIND == IMAGE
 uniform sampler2D image;
@@ -23,7 +27,7 @@ mat2 footprint() {
     vec2 affine = center_coordinate * gl_FragCoord.w;
     vec2 right = dFdx(affine) - coordinate * dFdx(gl_FragCoord.w);
     vec2 down = dFdy(affine) - coordinate * dFdy(gl_FragCoord.w);
-    return centroid_w * mat2(right, down);
+    return coordinate_w * mat2(right, down);
 }
 #endif
 
@@ -122,6 +126,8 @@ void main() {
 #if KIND == PLAIN
     radiance = vec4(surface_color, 1.0);
 #else
+    coordinate = centroid_place.xy / centroid_place.z;
+    coordinate_w = centroid_place.w / centroid_place.z;
     vec4 value = texture_value();
 #if KIND == IMAGE
 #if COVERAGE == 1

@@ -11,8 +11,7 @@ in int body;
 
 flat out vec3 surface_color;
 out vec2 center_coordinate;
-centroid out vec2 coordinate;
-centroid out float centroid_w;
+centroid out vec4 centroid_place;
 
 void main() {
     ivec2 at = ivec2(4 * (body % BODIES_PER_ROW), body / BODIES_PER_ROW);
@@ -24,6 +23,6 @@ void main() {
     gl_Position = clip_from_body * vec4(position, 1.0);
     surface_color = color;
     center_coordinate = texcoord;
-    coordinate = texcoord;
-    centroid_w = gl_Position.w;
+    // 1 in a way that no compiler knows, or it would not be interpolated
+    centroid_place = vec4(texcoord, body < 0 ? 0.0 : 1.0, gl_Position.w);
 }

@@ -1,4 +1,4 @@
-"""Cut-outs by alpha to coverage: borders as smooth as hardware samples allow, in their place, and nothing else changed."""
+"""Cut-outs by alpha to coverage: borders as smooth as hardware samples allow, in their place; all else unchanged."""
 
 import dataclasses
 

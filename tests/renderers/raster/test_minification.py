@@ -106,11 +106,10 @@ class Plane:
 VIEWS = list(itertools.product(["perspective", "orthographic"], range(8), [0.0]))
 
 
+@pytest.mark.usefixtures("numbered")
 @pytest.mark.parametrize(("projection", "seed", "bias"), [*VIEWS, ("perspective", 6, -1.7), ("orthographic", 4, 2.3)])
 @pytest.mark.parametrize("mode", ["mipmap", "trilinear"])
-def test_the_level_of_detail_is_within_what_opengl_allows_and_the_ideal_one(
-    make, numbered, projection, seed, bias, mode
-):
+def test_the_level_of_detail_is_within_what_opengl_allows_and_the_ideal_one(make, projection, seed, bias, mode):
     plane = Plane(make, projection, seed)
     drawn = render(plane.scene, f"raster:texture={mode},lod_bias={bias}", size=SIZE).pixels
     footprints, places = plane.footprints()
@@ -143,10 +142,11 @@ def test_those_views_are_magnified_minified_and_beyond_the_last_level(make):
     assert ((np.array(lods) > 0.0) & (np.array(lods) < LAST)).mean() > 0.4
 
 
+@pytest.mark.usefixtures("numbered")
 @pytest.mark.parametrize(("projection", "seed"), [(p, s) for p, s, _ in VIEWS])
 @pytest.mark.parametrize("most", [1, 2, 16])
 def test_anisotropic_taps_are_as_wide_as_the_ellipse_s_shorter_axis_or_their_share_of_the_longer(
-    make, numbered, projection, seed, most
+    make, projection, seed, most
 ):
     plane = Plane(make, projection, seed)
     technique = f"raster:texture=anisotropic,anisotropy={most},lod_bias=0.75"
@@ -163,7 +163,8 @@ def test_anisotropic_taps_are_as_wide_as_the_ellipse_s_shorter_axis_or_their_sha
     np.testing.assert_allclose(drawn[chosen][:, 0], expected[chosen], atol=FRACTION)
 
 
-def test_the_automatic_bias_shrinks_by_the_root_of_the_shading_samples_and_no_bias_does_not(make, numbered):
+@pytest.mark.usefixtures("numbered")
+def test_the_automatic_bias_shrinks_by_the_root_of_the_shading_samples_and_no_bias_does_not(make):
     corners = [[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]
     square = make.polygon(corners, uv=[(0, 0), (1, 0), (1, 1), (0, 1)], texture="t")
     scene = make.scene(square, textures={"t": image(512, 512)})
@@ -322,3 +323,25 @@ def test_hardware_samples_never_show_an_atlas_s_neighbour(make, mode, seed):
         assert (pixels < 0.1).sum() > 300
         # rounding of a coordinate at the border, times the step of 100 to a texel
         assert pixels.max() <= 0.5 + 100 * 16 * 2.0**-20
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_hardware_samples_of_a_receding_surface_are_looked_up_within_the_pixel(make, seed):
+    # Two triangles share the pixels along their seam, and each is looked up where its own samples are: less than a
+    # pixel away, so that the value is one of those about it. Forty periods from the middle of the surface an error of
+    # perspective of a hundredth is many texels.
+    texels = np.random.default_rng(seed).random((4, 4, 4), np.float32)
+    texels[..., 3] = 1.0
+    corners = np.array([[-20, -1, 1], [20, -1, 1], [20, -1, -40], [-20, -1, -40]], float)
+    camera = Camera("perspective", position=(0.0, 0.0, 0.0), target=(0.3 * seed - 0.5, -0.5, -1.0), fov_y_deg=60.0)
+    floor = make.polygon(corners, uv=corners[:, [0, 2]] * 0.25 + (17.0, 3.0), texture="t")
+    scene = make.scene(floor, camera=camera, textures={"t": ImageTexture(texels)})
+    plain, sampled = (
+        render(scene, f"raster:texture=linear{o}", size=(128, 96)).pixels[48:].astype(float) for o in ("", ",msaa=4")
+    )
+    around = np.stack([np.roll(plain, (dy, dx), (0, 1)) for dy in (-1, 0, 1) for dx in (-1, 0, 1)])
+    # bilinear between texels of 4 or more pixels each: extremes within a pixel are those at its neighbours, nearly
+    inside = np.s_[1:-1, 1:-1]
+    assert (sampled >= around.min(axis=0) - 0.02)[inside].all()
+    assert (sampled <= around.max(axis=0) + 0.02)[inside].all()
+    assert np.ptp(plain) > 0.5
