@@ -2,8 +2,8 @@
 
 Levels come from `textures.scene_chain` and not from the driver, so both renderers minify the same numbers; they are
 stored as 32-bit floats because drivers filter an 8-bit texture to 8 bits. Levels of detail and anisotropic taps are the
-shader's own too: drivers differ in both, and the software device's anisotropy costs more and gains less. Analytic textures are evaluated by the shader
-under point and linear, and are images otherwise.
+shader's own too: drivers differ in both, and the software device's anisotropy costs more and gains less. Analytic
+textures are evaluated by the shader under point and linear, and are images otherwise.
 """
 
 import math
