@@ -100,6 +100,8 @@ def make_shading(gl: moderngl.Context, scene: Scene, name: str | None, technique
         # the shader sees sub-pixels; the footprint that the bias shifts is the pixel's
         "lod_bias": chosen_lod_bias(technique) + math.log2(technique.ssaa),
         "anisotropy": technique.anisotropy,
+        # passes blur the border by a pixel themselves: a ramp of a whole pixel would do so twice
+        "ramp_width": technique.passes**-0.5,
     }
     # no alpha is below a cutoff of 0
     is_coverage = technique.alpha_to_coverage and cutoff is not None and cutoff > 0.0

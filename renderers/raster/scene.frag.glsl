@@ -16,6 +16,7 @@ float coordinate_w;
 #if KIND == IMAGE
 uniform sampler2D image;
 uniform float alpha_cutoff;
+uniform float ramp_width;        // pixels
 uniform float coverage_excess;   // what the device adds to alpha on average
 uniform float lod_bias;
 
@@ -131,8 +132,8 @@ void main() {
     vec4 value = texture_value();
 #if KIND == IMAGE
 #if COVERAGE == 1
-    // Castano's ramp: one pixel wide about the border, and as sharp as that whatever the texture's own slope is there
-    float slope = fwidth(value.a);
+    // Castano's ramp: as wide about the border as a pass's share of the pixel, whatever the texture's own slope is there
+    float slope = ramp_width * fwidth(value.a);
     float present = value.a < alpha_cutoff ? 0.0 : 1.0;
     value.a = slope > 1e-6 ? clamp((value.a - alpha_cutoff) / slope + 0.5 - coverage_excess, 0.0, 1.0) : present;
 #else

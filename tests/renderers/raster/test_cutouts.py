@@ -84,6 +84,22 @@ def test_borders_of_leaves_err_less_than_with_hardware_samples_alone(make):
         assert rmse(covered, exact.pixels) < 0.6 * rmse(alone, exact.pixels)
 
 
+# Passes smooth borders by themselves: ramps as wide as a pixel, in each of them, made the error up to 2.5 times as large.
+# Sub-pixels are small pixels, whose borders coverage smooths as it does those of pixels.
+@pytest.mark.parametrize(("more", "factor"), [("passes=4", 1.1), ("passes=16", 1.1), ("ssaa=2", 0.75)])
+def test_borders_are_not_blurred_twice_where_passes_smooth_them_too(make, more, factor):
+    for scene, reference in (
+        (leaves(make), "reference:texture=linear"),
+        (SCENES["window-screens"].build(kind="cutouts", wires=20.0, tilt_deg=17.0), "reference:"),
+    ):
+        exact = render(scene, reference, size=SIZE).pixels
+        alone, covered = (
+            render(scene, f"raster:texture=trilinear,{options},{more}", size=SIZE).pixels
+            for options in ("msaa=4", COVERAGE)
+        )
+        assert rmse(covered, exact) < factor * rmse(alone, exact)
+
+
 @pytest.mark.parametrize("angle_deg", [0.0, 20.0, 45.0])
 @pytest.mark.parametrize("cutoff", [0.3, 0.5, 0.8])
 def test_a_straight_border_is_where_the_cutoff_is_whatever_the_slope(make, angle_deg, cutoff):
