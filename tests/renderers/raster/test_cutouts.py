@@ -84,7 +84,7 @@ def test_borders_of_leaves_err_less_than_with_hardware_samples_alone(make):
         assert rmse(covered, exact.pixels) < 0.6 * rmse(alone, exact.pixels)
 
 
-# Passes smooth borders by themselves: ramps as wide as a pixel, in each of them, made the error up to 2.5 times as large.
+# Passes smooth borders by themselves: ramps a whole pixel wide in each of them made the error up to 2.5 times as large.
 # Sub-pixels are small pixels, whose borders coverage smooths as it does those of pixels.
 @pytest.mark.parametrize(("more", "factor"), [("passes=4", 1.1), ("passes=16", 1.1), ("ssaa=2", 0.75)])
 def test_borders_are_not_blurred_twice_where_passes_smooth_them_too(make, more, factor):
