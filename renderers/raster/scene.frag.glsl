@@ -37,8 +37,8 @@ uniform int anisotropy;
 
 // Trilinear taps along the longer axis of the footprint (GL_EXT_texture_filter_anisotropic's numbers), whose axes are
 // those of the ellipse that a pixel's disc becomes: the singular values of the footprint. The extension's example takes
-// the longer of the two columns, which is no axis where they are not at right angles: a tenth more error on floors, and
-// up to a third on a sheared one. The bias shrinks the whole footprint: taps keep to a sample's own share of the pixel.
+// the longer of the two columns, which is no axis where they are not at right angles: some hundredths more error on
+// floors, and up to a third on a sheared one. The bias shrinks the whole footprint: taps keep to a sample's own share of the pixel.
 vec4 anisotropic_value(vec2 size) {
     mat2 axes = footprint();
     // along a side of one texel nothing changes
