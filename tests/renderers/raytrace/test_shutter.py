@@ -12,18 +12,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from closed_forms import ANIMATION, assert_estimates, box, pixel_scene, sample, sector_shares, square_of_positive
 from scipy import stats
 
-from aliasbench.renderers.catalog import prepare, render
+from aliasbench.renderers.catalog import render
 from aliasbench.scenes.errors import InputError
 from aliasbench.scenes.files import load_scene
-from aliasbench.scenes.model import Animation, Camera, FloatArray, Motion, Scene, Spin, Surface
+from aliasbench.scenes.model import Camera, Motion, Scene, Spin, Surface
 from aliasbench.scenes.motion import rotation_matrix
 from aliasbench.scenes.shapes import polygon
 
 TRIALS = int(os.environ.get("TRIALS", "6"))
 SAMPLERS = ("random", "jittered", "multijittered", "sobol", "bluenoise")
-ANIMATION = Animation(fps=20.0, shutter=0.5)
+CASES = [("raytrace:spp={},sampler={}", name) for name in SAMPLERS]
+CASES += [("raster:passes={},sampler={}", name) for name in SAMPLERS if name != "bluenoise"]
 AXIS, MIDDLE = (0.0, 0.0, 1.0), (0.0, 0.0, 0.0)
 
 
@@ -33,52 +35,12 @@ def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ALIASBENCH_CACHE", str(tmp_path))
 
 
-def sample(scene: Scene, technique: str, size: tuple[int, int], seeds: int, frame: int = 0) -> FloatArray:
-    """Return pictures (seeds, h, w, 3)."""
-    with prepare(scene, technique, size=size) as prepared:
-        return np.array([prepared.render(frame, seed).pixels for seed in range(seeds)], dtype=np.float64)
-
-
-def assert_estimates(
-    pictures: FloatArray, truth: FloatArray, *, spread: float, samples: int, bound: float = 0.0
-) -> None:
-    """Assert that pictures (n, h, w, 3) are unbiased estimates of `truth`, values of at most 1 known to `bound`.
-
-    Single values and the whole picture's mean are held to Student's t: once in 10 000 tests would a right one fail.
-    `spread` is the most that the standard errors may be in the root mean square. What none of a pixel's `samples` in
-    all pictures has met is worth at most 14 / samples: else it were met with probability 1 - e^-14.
-    """
-    n = len(pictures)
-    error = pictures.std(axis=0, ddof=1) / math.sqrt(n)
-    off = pictures.mean(axis=0) - truth
-    limit = stats.t.ppf(1 - 1e-4 / (2 * off.size), n - 1) * error + 14 / samples + bound
-    assert (np.abs(off) <= limit).all(), f"off by up to {np.max(np.abs(off) / limit):.2f} of what is allowed"
-    whole = (pictures - truth).mean(axis=(1, 2, 3))
-    z = (abs(whole.mean()) - bound) / max(float(whole.std(ddof=1)) / math.sqrt(n), 1e-6)
-    assert z < stats.t.ppf(1 - 5e-5, n - 1), f"the whole is off by {z:.1f} standard errors, {whole.mean():.2e}"
-    assert np.sqrt((error**2).mean()) <= spread
-
-
-def pixel_scene(objects: list[Surface], height: float, animation: Animation = ANIMATION, **camera: object) -> Scene:
-    """Return a scene of which a world unit is a pixel at `height` pixels, its origin in the middle."""
-    place = replace(Camera("orthographic", height=height), **camera)  # type: ignore[arg-type]
-    return Scene("shutter", place, tuple(objects), animation=animation)
-
-
-def box(x0: float, y0: float, x1: float, y1: float, z: float = 0.0) -> list[tuple[float, float, float]]:
-    return [(x0, y0, z), (x1, y0, z), (x1, y1, z), (x0, y1, z)]
-
-
-def square_of_positive(x: FloatArray) -> FloatArray:
-    return np.maximum(x, 0.0) ** 2 / 2
-
-
 # Edges
 
 
-@pytest.mark.parametrize("sampler", SAMPLERS)
+@pytest.mark.parametrize(("technique", "sampler"), CASES)
 @pytest.mark.parametrize(("velocity", "frame"), [(300.0, 0), (-300.0, 2), (10.0, 1)])
-def test_an_edge_that_moves_leaves_a_ramp(sampler: str, velocity: float, frame: int) -> None:
+def test_an_edge_that_moves_leaves_a_ramp(sampler: str, velocity: float, frame: int, technique: str) -> None:
     size, spp, seeds = (24, 8), 32, 24
     # In the middle of the frame's shutter the edge is at 0.3 right of the picture's middle.
     middle = (frame + 0.25) / 20.0
@@ -90,34 +52,16 @@ def test_an_edge_that_moves_leaves_a_ramp(sampler: str, velocity: float, frame: 
     truth = -np.diff((high - low) / way)
     assert truth[0] == pytest.approx(1.0)
     assert truth[-1] == pytest.approx(0.0)
-    pictures = sample(pixel_scene([body], 8.0), f"raytrace:spp={spp},sampler={sampler}", size, seeds, frame)
+    pictures = sample(pixel_scene([body], 8.0), technique.format(spp, sampler), size, seeds, frame)
     expected = np.broadcast_to(truth[None, :, None], (8, 24, 3))
     assert_estimates(pictures, expected, spread=0.5 / math.sqrt(spp * seeds), samples=spp * seeds)
 
 
-def sector_shares(begin: float, turns: float, width: float, size: tuple[int, int]) -> FloatArray:
-    """Return the shares of time (h, w) that pixels are in a sector of `width` turns, from `begin` to begin + turns.
-
-    A point at angle p (in turns) is in it while the sector's first edge is at p - width to p: the mean over the turns
-    of a wave of period 1, whose integral is floor(x) width + min(frac(x), width). Over the pixel by 24 x 24 points.
-    """
-    fine = 24
-    x = (np.arange(size[0] * fine) + 0.5) / fine - size[0] / 2
-    y = size[1] / 2 - (np.arange(size[1] * fine) + 0.5) / fine
-    angle = np.arctan2(y[:, None], x[None, :]) / (2 * math.pi)
-
-    def integral(edge: FloatArray) -> FloatArray:
-        # of 1[frac(edge - (p - width)) < width] over the edge's place
-        along = edge - angle + width
-        return np.floor(along) * width + np.minimum(along - np.floor(along), width)
-
-    shares = (integral(np.asarray(begin + turns)) - integral(np.asarray(begin))) / turns
-    return shares.reshape(size[1], fine, size[0], fine).mean(axis=(1, 3))
-
-
-@pytest.mark.parametrize("sampler", ["random", "sobol"])
+@pytest.mark.parametrize(("technique", "sampler"), [c for c in CASES if c[1] in ("random", "sobol")])
 @pytest.mark.parametrize("turns", [0.3, -0.3, 2.5, -2.5, 100.0, 100.4])
-def test_a_sector_that_turns_covers_each_pixel_its_share_of_the_time(sampler: str, turns: float) -> None:
+def test_a_sector_that_turns_covers_each_pixel_its_share_of_the_time(
+    sampler: str, turns: float, technique: str
+) -> None:
     size, spp, seeds, frame, width = (24, 20), 64, 24, 3, 0.22
     rate = turns / 0.5 * 20.0
     begin = 0.05 + math.fmod(frame * rate / 20.0, 1.0)
@@ -129,7 +73,7 @@ def test_a_sector_that_turns_covers_each_pixel_its_share_of_the_time(sampler: st
         np.testing.assert_allclose(truth, width, atol=1e-9)
     else:
         assert np.ptp(truth) > 0.0005
-    pictures = sample(pixel_scene([body], 20.0), f"raytrace:spp={spp},sampler={sampler}", size, seeds, frame)
+    pictures = sample(pixel_scene([body], 20.0), technique.format(spp, sampler), size, seeds, frame)
     # 24 x 24 points a pixel are off where an edge's path starts or ends in it: a row of 24 counts an interval to 1/24
     # of a share that varies by one over |turns|, or the whole where the sector's tip is.
     expected = np.broadcast_to(truth[..., None], (*truth.shape, 3))
