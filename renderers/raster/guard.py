@@ -45,6 +45,8 @@ class Pieces:
         Of each triangle the corner that is nearest to the camera.
     surfaces : (m,) int32
         For each triangle the index of its object.
+    triangles : (m,) int64
+        What it was cut from: the number of a triangle, counted body by body.
     matrix : (4, 4) float64
     """
 
@@ -52,6 +54,7 @@ class Pieces:
     uv: FloatArray
     nearest: NDArray[np.int64]
     surfaces: NDArray[np.int32]
+    triangles: NDArray[np.int64]
     matrix: FloatArray
 
 
@@ -97,22 +100,25 @@ class Guard:
         InputError
             If an orthographic picture is so small a part of an object that float64 cannot place it either.
         """
-        corners, surfaces = [np.zeros((0, 3, 6))], [np.zeros(0, np.int32)]
+        corners, surfaces = [np.zeros((0, 3, 7))], [np.zeros(0, np.int32)]
+        first = 0
         for body, matrix in zip(self._bodies, matrices, strict=True):
             chosen = far[body.surfaces]
             if chosen.any():
                 cut, owners = _cut_body(body, matrix, chosen, self._polygon, self._perspective)
+                cut[..., 6] += first
                 corners.append(cut)
                 surfaces.append(owners)
+            first += len(body.triangles)
         joined = np.concatenate(corners)
-        place, uv = joined[..., :4], joined[..., 4:]
+        place, uv, triangles = joined[..., :4], joined[..., 4:6], joined[:, 0, 6].astype(np.int64)
         nearest = np.argmin(place[..., 3], axis=1)
         matrix = np.eye(4)
         if self._perspective:
             # z is the same for a whole body: one matrix does for all when it is divided out
             matrix[2:, 2:] = [[0.0, 1.0], [1.0, 0.0]]
             place = place[..., [0, 1, 3]] / place[..., 2:3]
-        return Pieces(place[..., :3], uv, nearest, np.concatenate(surfaces), matrix)
+        return Pieces(place[..., :3], uv, nearest, np.concatenate(surfaces), triangles, matrix)
 
 
 def _surely_near(matrices: FloatArray, boxes: FloatArray, limit: float, perspective: bool) -> BoolArray:
@@ -190,12 +196,13 @@ def _plane(place: FloatArray) -> tuple[FloatArray, FloatArray]:
 def _cut_body(
     body: Body, matrix: FloatArray, chosen: BoolArray, polygon: BoolArray, perspective: bool
 ) -> tuple[FloatArray, NDArray[np.int32]]:
-    """Return the chosen triangles cut, (m, 3, 6): clip space and uv, and the object of each."""
+    """Return the chosen triangles cut, (m, 3, 7): clip space, uv and number in the body, and the object of each."""
     place = body.vertices @ matrix[:, :3].T + matrix[:, 3]
     terms = _terms(body.vertices, matrix)
     if not perspective:
         place[:, 2] = np.where(np.abs(place[:, 2]) <= _ROUNDING * terms[:, 2], 0.0, place[:, 2])
-    corners = np.concatenate([place, body.uv], axis=1)[body.triangles[chosen]]
+    corners = np.concatenate([place, body.uv, np.zeros((len(place), 1))], axis=1)[body.triangles[chosen]]
+    corners[..., 6] = np.flatnonzero(chosen)[:, None]
     owners = body.surfaces[chosen]
     if perspective:
         height, normal = _plane(corners[..., :4])
@@ -225,7 +232,7 @@ def _check_size(place: FloatArray, owners: NDArray[np.int32], sides: Sequence[Se
 def _cut_side(
     corners: FloatArray, owners: NDArray[np.int32], side: Sequence[float]
 ) -> tuple[FloatArray, NDArray[np.int32]]:
-    """Return what of triangles (m, 3, 6) lies where `side` . (x, y, z, w) >= 0, as triangles, and their objects."""
+    """Return what of triangles (m, 3, n) lies where `side` . (x, y, z, w) >= 0, as triangles, and their objects."""
     distance = corners[..., :4] @ np.asarray(side)
     inside = distance >= 0.0
     count = inside.sum(axis=1)

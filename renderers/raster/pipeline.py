@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from aliasbench.renderers.geometry import Body
 from aliasbench.renderers.raster.alpha_coverage import ALPHA_TO_COVERAGE, coverage_excess
+from aliasbench.renderers.raster.answers import make_light
 from aliasbench.renderers.raster.graphics import GraphicsContext, read_shader
 from aliasbench.renderers.raster.guard import BoolArray, Pieces
 from aliasbench.renderers.raster.minification import (
@@ -29,7 +30,7 @@ from aliasbench.scenes.errors import InputError
 from aliasbench.scenes.model import FloatArray, Scene
 
 BODIES_PER_ROW = 1024  # as in scene.vert.glsl
-_VERTEX = np.dtype([("position", "3f4"), ("texcoord", "2f4"), ("color", "3f4"), ("body", "i4")])
+_VERTEX = np.dtype([("position", "3f4"), ("texcoord", "2f4"), ("color", "3f4"), ("body", "i4"), ("triangle", "i4")])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,12 +44,12 @@ class _Batch:
     owners: NDArray[np.int32]
 
 
-def _shader(name: str, shading: Shading) -> str:
+def _shader(name: str, shading: Shading, defined: Sequence[str] = (), before: str = "") -> str:
     names = [*KINDS, *MODES]
     lines = ["#version 330 core", *(f"#define {n} {i}" for i, n in enumerate(names))]
-    lines += [f"#define KIND {shading.kind}", f"#define MODE {shading.mode}"]
-    lines += [f"#define COVERAGE {int(shading.is_coverage)}", "#line 1"]
-    return "\n".join(lines) + "\n" + read_shader(name)
+    lines += [f"#define KIND {shading.kind}", f"#define MODE {shading.mode}", *(f"#define {n}" for n in defined)]
+    lines += [f"#define COVERAGE {int(shading.is_coverage)}"]
+    return "\n".join(lines) + "\n" + before + "#line 1\n" + read_shader(name)
 
 
 class SceneBuffers:
@@ -62,7 +63,10 @@ class SceneBuffers:
             name: make_shading(gl, scene, name, technique, context.max_texture_size)
             for name in dict.fromkeys(texture_names)
         }
-        vertices, triangles, surfaces = _gather(scene, bodies, [shadings[n] for n in texture_names])
+        self.light = make_light(context, scene, bodies, technique, shadings)
+        vertices, triangles, surfaces = _gather(
+            scene, bodies, [shadings[n] for n in texture_names], apart=self.light is not None
+        )
         self._vertices = gl.buffer(vertices.tobytes()) if len(vertices) else None
         self._batches: list[_Batch] = []
         self._colors = np.array([s.color for s in scene.objects]).reshape(-1, 3)
@@ -86,7 +90,10 @@ class SceneBuffers:
         self._matrices.filter = (moderngl.NEAREST, moderngl.NEAREST)
 
     def _make_batch(self, triangles: NDArray[np.int32], owners: NDArray[np.int32], shading: Shading) -> _Batch:
-        program = self._context.program(_shader("scene.vert.glsl", shading), _shader("scene.frag.glsl", shading))
+        defined, before = ((), "") if self.light is None else (self.light.defined, self.light.text)
+        program = self._context.program(
+            _shader("scene.vert.glsl", shading, defined), _shader("scene.frag.glsl", shading, defined, before)
+        )
         index = self._context.gl.buffer(np.ascontiguousarray(triangles).tobytes())
         array = self._make_array(program, self._vertices, index)
         return _Batch(array, index, shading, triangles, owners)
@@ -96,7 +103,7 @@ class SceneBuffers:
     ) -> moderngl.VertexArray:
         # names the shader does not use are left out of a linked program
         used = [n if n in program else None for n in _VERTEX.names or ()]
-        sizes = {"position": "3f4", "texcoord": "2f4", "color": "3f4", "body": "1i4"}
+        sizes = {"position": "3f4", "texcoord": "2f4", "color": "3f4", "body": "1i4", "triangle": "1i4"}
         padding = {"3f4": "12x", "2f4": "8x", "1i4": "4x"}
         layout = " ".join(sizes[n] if u else padding[sizes[n]] for n, u in zip(sizes, used, strict=True))
         return self._context.gl.vertex_array(program, [(vertices, layout, *(u for u in used if u))], index)
@@ -110,9 +117,10 @@ class SceneBuffers:
             matrices = np.concatenate([matrices, pieces.matrix[None]])
         self._matrices.write(pack_matrices(matrices, self._row_length, self._matrices.height).tobytes())
         self._matrices.use(0)
+        placing = {} if self.light is None else self.light.use()
         for batch in self._batches:
             program = batch.array.program
-            values = {**batch.shading.uniforms, "matrices": 0, "image": 1}
+            values = {**batch.shading.uniforms, "matrices": 0, "image": 1, **placing}
             for name, value in values.items():
                 if name in program:
                     program[name] = value
@@ -144,6 +152,8 @@ class SceneBuffers:
         vertices = np.zeros((int(chosen.sum()), 3), _VERTEX)
         vertices["position"], vertices["body"] = pieces.corners[chosen], body
         vertices["color"] = self._colors[pieces.surfaces[chosen]][:, None]
+        if self.light is not None:
+            vertices["triangle"] = self.light.ranks[pieces.triangles[chosen]][:, None]
         vertices["texcoord"] = piece_coordinates(batch.shading, pieces.uv[chosen], pieces.nearest[chosen])
         buffer = self._context.gl.buffer(vertices.tobytes())
         array = self._make_array(batch.array.program, buffer, None)
@@ -160,14 +170,19 @@ class SceneBuffers:
             if shading.image is not None:
                 shading.image.release()
         self._matrices.release()
+        if self.light is not None:
+            self.light.release()
         if self._vertices is not None:
             self._vertices.release()
 
 
 def _gather(
-    scene: Scene, bodies: Sequence[Body], shadings: Sequence[Shading]
+    scene: Scene, bodies: Sequence[Body], shadings: Sequence[Shading], *, apart: bool
 ) -> tuple[NDArray[np.void], NDArray[np.int32], NDArray[np.int32]]:
-    """Return the vertices of all bodies, (m, 3) triangles in the objects' order, and each triangle's object."""
+    """Return the vertices of all bodies, (m, 3) triangles in the objects' order, and each triangle's object.
+
+    With `apart` every triangle has vertices of its own, which know its number.
+    """
     starts = np.cumsum([0, *(len(b.vertices) for b in bodies)])
     vertices = np.zeros(starts[-1], _VERTEX)
     for number, body in enumerate(bodies):
@@ -183,4 +198,9 @@ def _gather(
         return vertices, np.zeros((0, 3), np.int32), np.zeros(0, np.int32)
     owner = np.concatenate(surfaces)
     order = np.argsort(owner, kind="stable")
-    return vertices, np.concatenate(triangles).astype(np.int32)[order], owner[order].astype(np.int32)
+    joined, owner = np.concatenate(triangles).astype(np.int32)[order], owner[order].astype(np.int32)
+    if apart:
+        vertices = vertices[joined.ravel()]
+        joined = np.arange(len(vertices), dtype=np.int32).reshape(-1, 3)
+        vertices["triangle"] = np.arange(len(joined), dtype=np.int32).repeat(3)
+    return vertices, joined, owner

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from aliasbench.renderers.frame import Frame, Progress
 from aliasbench.renderers.geometry import build_bodies
+from aliasbench.renderers.lights import with_lights
 from aliasbench.renderers.raster.context import acquire_context, check_samples
 from aliasbench.renderers.raster.exposures import Exposure, Exposures
 from aliasbench.renderers.raster.filtering import make_optics
@@ -25,7 +26,14 @@ from aliasbench.renderers.raster.graphics import GraphicsContext
 from aliasbench.renderers.raster.guard import Guard
 from aliasbench.renderers.raster.pipeline import SceneBuffers
 from aliasbench.renderers.raster.placement import make_placement
-from aliasbench.renderers.raster.projection import MOST_DISTANT, Instant, Window, clip_matrices, depth_rule
+from aliasbench.renderers.raster.projection import (
+    MOST_DISTANT,
+    Instant,
+    Window,
+    clip_matrices,
+    depth_rule,
+    pass_view,
+)
 from aliasbench.renderers.raster.targets import Target, make_layout
 from aliasbench.renderers.sampling.patterns import sampler_code
 from aliasbench.renderers.sampling.warps import IDENTITY
@@ -71,8 +79,6 @@ def _check_available(scene: Scene, technique: Technique) -> None:
 
 def _check_drawn(scene: Scene) -> None:
     """Raise UnsupportedScene for what of light the rasterizer does not draw."""
-    if scene.lights:
-        raise UnsupportedScene(f"raster: lights ({len(scene.lights)}) are not drawn; scenes without lights are")
     if scene.bounces:
         raise UnsupportedScene(
             f"raster: diffuse interreflection (bounces = {scene.bounces}) is not drawn; direct light alone is"
@@ -81,7 +87,7 @@ def _check_drawn(scene: Scene) -> None:
         if surface.material.kind not in ("unlit", "diffuse"):
             raise UnsupportedScene(
                 f"raster: material {surface.material.kind} (object {surface.name or f'number {index}'}) is not drawn; "
-                "unlit is, and diffuse without lights"
+                "unlit and diffuse are"
             )
 
 
@@ -102,6 +108,7 @@ def _check_range(scene: Scene) -> None:
             (f"{which}: spin center", () if spin is None else spin.center),
             (f"{which}: matrices", surface.motion.matrices or ()),
         ]
+    rows += [(f"light {k}: quad", light.quad) for k, light in enumerate(scene.lights)]
     for what, values in rows:
         largest = float(np.abs(np.asarray(values, dtype=np.float64)).max(initial=0.0))
         if not largest <= MOST_DISTANT:
@@ -121,6 +128,7 @@ class RasterScene:
     def __init__(
         self, context: GraphicsContext, scene: Scene, technique: Technique, size: tuple[int, int], start: float
     ) -> None:
+        scene = with_lights(scene)
         self._context, self._scene, self._technique, self._size = context, scene, technique, size
         self._optics = make_optics(technique)
         self._layout = make_layout(context, size, technique, self._optics)
@@ -235,6 +243,8 @@ class RasterScene:
         ssaa = self._layout.ssaa
         drawn = (self._size[0] * ssaa, self._size[1] * ssaa)
         matrices = clip_matrices(self._scene, self._placement, instant, size=drawn, window=part.window)
+        if self._buffers.light is not None:
+            self._buffers.light.update(exposure, instant, pass_view(self._scene, instant, drawn), part.window)
         far = part.guard.far_objects(matrices)
         self._target.begin(self._scene.background)
         if far.any():

@@ -123,10 +123,25 @@ vec4 texture_value() {
 }
 #endif
 
+#ifdef PLACED
+// without lights only gloss needs to know where it is
+vec3 answer() {
+    Place place = place_of();
+    if (place.kind == LIGHT) {
+        return vec3(place.is_front ? 1.0 : 0.0);
+    }
+#ifdef LIT
+    if (place.kind == DIFFUSE) {
+        return place.is_sure ? light_at(place) : vec3(0.0);
+    }
+#endif
+    return vec3(1.0);
+}
+#endif
+
 void main() {
-#if KIND == PLAIN
-    radiance = vec4(surface_color, 1.0);
-#else
+    vec4 color = vec4(surface_color, 1.0);
+#if KIND != PLAIN
     coordinate = centroid_place.xy / centroid_place.z;
     coordinate_w = centroid_place.w / centroid_place.z;
     vec4 value = texture_value();
@@ -143,6 +158,10 @@ void main() {
     value.a = 1.0;
 #endif
 #endif
-    radiance = vec4(surface_color * value.rgb, value.a);
+    color *= value;
 #endif
+#ifdef PLACED
+    color.rgb *= answer();
+#endif
+    radiance = color;
 }

@@ -12,6 +12,13 @@ in int body;
 flat out vec3 surface_color;
 out vec2 center_coordinate;
 centroid out vec4 centroid_place;
+#ifdef PLACED
+in int triangle;
+flat out int surface_triangle;
+#ifdef SAMPLES
+centroid out vec4 clip_place;
+#endif
+#endif
 
 void main() {
     ivec2 at = ivec2(4 * (body % BODIES_PER_ROW), body / BODIES_PER_ROW);
@@ -25,4 +32,10 @@ void main() {
     center_coordinate = texcoord;
     // 1 in a way that no compiler knows, or it would not be interpolated
     centroid_place = vec4(texcoord, body < 0 ? 0.0 : 1.0, gl_Position.w);
+#ifdef PLACED
+    surface_triangle = triangle;
+#ifdef SAMPLES
+    clip_place = gl_Position;
+#endif
+#endif
 }

@@ -16,10 +16,10 @@ from numba import carray, cfunc, njit, types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
+from aliasbench.renderers.lights import LIGHT_SIZE
 from aliasbench.renderers.raytrace.bodies import BODY_SIZE
 from aliasbench.renderers.raytrace.cutouts import is_hole, write_packet_alpha
 from aliasbench.renderers.raytrace.lanes import CAMERA_SIZE, RED, SCRATCH_SIZE
-from aliasbench.renderers.raytrace.paths import LIGHT_SIZE
 from aliasbench.renderers.raytrace.shading import TRIANGLE_SIZE, EwaTables, Tables
 from aliasbench.renderers.raytrace.texturing import CUTOFF, OBJECT_SIZE
 from aliasbench.scenes.model import FloatArray

@@ -16,6 +16,18 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from aliasbench.renderers.lights import (
+    AREA,
+    BEFORE_LIGHT,
+    CHANCE,
+    CHANCES_BEFORE,
+    CORNER,
+    EDGE_1,
+    EDGE_2,
+    LIGHT_NORMAL,
+    OFF_SURFACE,
+    RADIANCE,
+)
 from aliasbench.renderers.raytrace.film import (
     RUN_LANE,
     RUN_LANES,
@@ -62,20 +74,6 @@ from aliasbench.scenes.model import FloatArray
 MOST_SEGMENTS = 24  # of a path
 UNLIT, LIGHT, DIFFUSE, GLOSSY, GLASS = 0.0, 1.0, 2.0, 3.0, 4.0
 
-# Values of a light: corner, two edges, unit normal of its bright side, radiance, area, and the chance to be drawn with
-# the sum of those before.
-CORNER, EDGE_1, EDGE_2, LIGHT_NORMAL, RADIANCE, AREA, CHANCE, CHANCES_BEFORE, LIGHT_SIZE = (
-    0,
-    3,
-    6,
-    9,
-    12,
-    15,
-    16,
-    17,
-    18,
-)
-
 # What a path is about to do: nothing any more; fly on, from the camera or a mirror, from a diffuse surface, or from a
 # mirror after one; be lit, and then bounce; be lit, and then end.
 DONE, FLYING, LEFT_DIFFUSE, REFLECTED, LIT, LIT_LAST = 0, 1, 2, 3, 4, 5
@@ -88,8 +86,6 @@ PATH_SIZE = 304
 # Rows of a shadow ray's scratch for what it brings; in the rows of colours tests for holes leave their alphas.
 BROUGHT = LENS_X
 
-_OFF_SURFACE = 2e-6  # some 30 ulp of float32: twice what intersection may be off
-_BEFORE_LIGHT = 1e-4  # of the way, which shadow rays stop short of their light at least
 _CHANCE = 0x7A7B  # what keys of a path's later random numbers are derived with
 _NUMBERS_EACH = 8
 
@@ -255,7 +251,7 @@ def _arrive(tables: Tables, hit: int, rows: FloatArray, scratch: FloatArray, i: 
         scratch[OZ + i] + t * scratch[DZ + i],
     )
     rows[PLACE + i], rows[PLACE + LANES + i], rows[PLACE + 2 * LANES + i] = x, y, z
-    rows[STEP + i] = _OFF_SURFACE * max(tables.triangles[hit, REACH], abs(x), abs(y), abs(z))
+    rows[STEP + i] = OFF_SURFACE * max(tables.triangles[hit, REACH], abs(x), abs(y), abs(z))
     return normalized(nx, ny, nz)
 
 
@@ -333,8 +329,8 @@ def aim_at_lights(
             continue
         x, y, z = _off_surface(rows, i, dx, dy, dz)
         # Far from where coordinates start, the light's own surface may lie before it by rounding.
-        unsure = (rows[STEP + i] + _OFF_SURFACE * max(abs(px), abs(py), abs(pz))) / np.sqrt(square)
-        far = max(1.0 - max(_BEFORE_LIGHT, unsure), 0.0)
+        unsure = (rows[STEP + i] + OFF_SURFACE * max(abs(px), abs(py), abs(pz))) / np.sqrt(square)
+        far = max(1.0 - max(BEFORE_LIGHT, unsure), 0.0)
         write_lane(shadow, ray, i, x, y, z, px - x, py - y, pz - z, far)
         shadow[TIME + i] = scratch[TIME + i]
         weight *= light[AREA] * here * there / (np.pi * square * square * light[CHANCE])

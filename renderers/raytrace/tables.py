@@ -258,7 +258,7 @@ def build_tables(
 ) -> Tables:
     """Return everything that hits are looked up in, for one exposure.
 
-    `bodies` (b, BODY_SIZE) are those that move, `lights` as `lighting.light_values` has them.
+    `bodies` (b, BODY_SIZE) are those that move, `lights` as `lights.light_values` has them.
     """
     still_only = not moving.owners.size
     kind = EwaTables if (looks.objects[:, KIND] == EWA).any() else Tables

@@ -15,12 +15,13 @@ from numpy.typing import NDArray
 
 from aliasbench.renderers.frame import Frame, Progress
 from aliasbench.renderers.geometry import build_bodies
+from aliasbench.renderers.lights import light_values, with_lights
 from aliasbench.renderers.raytrace.allocation import error_exponent
 from aliasbench.renderers.raytrace.bodies import BODY_SIZE, body_values
 from aliasbench.renderers.raytrace.development import Development, Room, is_plain, make_optics
 from aliasbench.renderers.raytrace.exposure import Exposure, plan_exposure
 from aliasbench.renderers.raytrace.film import Film
-from aliasbench.renderers.raytrace.lighting import is_scattered, light_values, put_materials, with_lights
+from aliasbench.renderers.raytrace.lighting import is_scattered, put_materials
 from aliasbench.renderers.raytrace.paths import Scattering
 from aliasbench.renderers.raytrace.shading import Tables
 from aliasbench.renderers.raytrace.tables import (

@@ -14,7 +14,7 @@ from aliasbench.renderers.raster.projection import DepthRule
 from aliasbench.renderers.raster.targets import Target, make_layout
 from aliasbench.renderers.technique import parse_technique
 from aliasbench.scenes.errors import InputError, NotAvailableError, UnsupportedScene
-from aliasbench.scenes.model import Light, Material
+from aliasbench.scenes.model import Material
 
 pytestmark = pytest.mark.usefixtures("gl_checked")
 SIZE = (32, 24)
@@ -83,12 +83,8 @@ def test_features_that_are_not_there_yet_say_what_is(make, technique, feature):
 
 def test_materials_and_lights_that_are_not_drawn_are_named(make):
     star = make.star()
-    light = Light(((0, 0, 2), (1, 0, 2), (1, 1, 2), (0, 1, 2)), (1.0, 1.0, 1.0))
-    diffuse = tuple(replace(s, material=Material("diffuse")) for s in star.objects)
     glass = tuple(replace(s, material=Material("glass")) for s in star.objects)
     for scene, feature in (
-        (replace(star, lights=(light,)), r"lights \(1\) are"),
-        (replace(star, lights=(light,), objects=diffuse), r"lights \(1\) are"),
         (replace(star, objects=glass), r"material glass \(object .*\) is"),
         (replace(star, bounces=1), r"diffuse interreflection \(bounces = 1\) is"),
     ):

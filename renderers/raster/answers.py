@@ -1,0 +1,86 @@
+"""What surfaces that are not simply their colour need in a pass, put together: planes, lights, what gloss mirrors.
+
+Scenes without lights and gloss have none of this, and their shaders nothing of it.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from aliasbench.renderers.geometry import Body
+from aliasbench.renderers.raster.exposures import Exposure
+from aliasbench.renderers.raster.graphics import GraphicsContext, read_shader
+from aliasbench.renderers.raster.lighting import Lighting
+from aliasbench.renderers.raster.minification import Shading
+from aliasbench.renderers.raster.placement import make_placement
+from aliasbench.renderers.raster.projection import Instant, Window
+from aliasbench.renderers.raster.surfaces import Surfaces, Uniforms, objects_order
+from aliasbench.renderers.technique import Technique
+from aliasbench.scenes.model import Scene
+from aliasbench.scenes.projection import View
+
+_PLANES, _LIGHTS = 2, 3  # texture units; those before are the scene's own
+
+
+class Light:
+    """How the surfaces of a scene answer light, on the device; made and used inside the context's `use`.
+
+    Attributes
+    ----------
+    defined : tuple of str
+        What shaders are told.
+    text : str
+        What comes before a fragment shader.
+    ranks : (m,) int64
+        The number among the objects' triangles of each triangle counted body by body.
+    """
+
+    def __init__(
+        self,
+        context: GraphicsContext,
+        scene: Scene,
+        bodies: Sequence[Body],
+        technique: Technique,
+        shadings: dict[str | None, Shading],
+    ) -> None:
+        order = objects_order(bodies)
+        self.ranks = np.empty_like(order)
+        self.ranks[order] = np.arange(len(order))
+        self._surfaces = Surfaces(context, scene, bodies, make_placement(bodies), _PLANES)
+        self._lighting: Lighting | None = None
+        self.defined: tuple[str, ...] = ("PLACED",)
+        self.text = read_shader("surface.glsl")
+        if technique.msaa > 1:
+            self.defined += ("SAMPLES",)
+        if scene.lights:
+            self._lighting = Lighting(context, scene, technique, self._surfaces, shadings, _LIGHTS)
+            self.defined += ("LIT",)
+            self.text += self._lighting.text
+
+    def update(self, exposure: Exposure, instant: Instant, view: View, window: Window) -> None:
+        """Make it that of a pass."""
+        self._surfaces.update(instant, view, window)
+        if self._lighting is not None:
+            self._lighting.update(exposure, instant.frame)
+
+    def use(self) -> Uniforms:
+        """Bind what shaders read; return their uniforms."""
+        self._surfaces.use()
+        return self._surfaces.uniforms | ({} if self._lighting is None else self._lighting.use())
+
+    def release(self) -> None:
+        """Free everything."""
+        self._surfaces.release()
+        if self._lighting is not None:
+            self._lighting.release()
+
+
+def make_light(
+    context: GraphicsContext,
+    scene: Scene,
+    bodies: Sequence[Body],
+    technique: Technique,
+    shadings: dict[str | None, Shading],
+) -> Light | None:
+    """Return how a scene's surfaces answer light; None where each shows its colour and no more."""
+    return Light(context, scene, bodies, technique, shadings) if scene.lights else None

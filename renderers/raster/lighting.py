@@ -1,0 +1,204 @@
+"""Area lights in accumulation passes: each pass is lit by one point of the lights for each shadow ray.
+
+The points are those that the ray tracer takes for that sample (`renderers.lights`), so both make the same picture of
+equal samples. Whether a fragment sees a point is decided exactly, against all triangles (`occluders`), in scenes of up
+to MOST_EXACT of them; in larger ones by a depth map drawn from the point (`shadow_maps`).
+
+Measured on llvmpipe at 512 x 512, a floor all over the picture: see MOST_EXACT. With hardware samples the light, and
+with it the border of a shadow, is evaluated once a pixel.
+"""
+
+import numpy as np
+
+from aliasbench.renderers.lights import (
+    AREA,
+    CHANCE,
+    CHANCES_BEFORE,
+    CORNER,
+    EDGE_1,
+    EDGE_2,
+    LIGHT_NORMAL,
+    RADIANCE,
+    light_values,
+)
+from aliasbench.renderers.raster.exposures import Exposure
+from aliasbench.renderers.raster.graphics import GraphicsContext, read_shader
+from aliasbench.renderers.raster.minification import Shading, shader_coordinates
+from aliasbench.renderers.raster.occluders import GROUP, box_corners, cones, neighbours_order, pyramids
+from aliasbench.renderers.raster.surfaces import DIFFUSE, Surfaces
+from aliasbench.renderers.technique import Technique
+from aliasbench.scenes.errors import UnsupportedScene
+from aliasbench.scenes.model import FloatArray, ImageTexture, Scene
+from aliasbench.scenes.projection import View, view_at
+
+MOST_EXACT = 512  # triangles
+_MOST_CUTOUTS = 8  # textures: OpenGL 3.3 grants a shader 16
+_HEADER = 3  # texels of a light point before its occluders: place, what it brings, normal
+_FIRST_SLOT = 8  # of cut-out textures
+
+
+class LightPoints:
+    """The pass's points on the lights.
+
+    Attributes
+    ----------
+    places, normals, brought : (k, 3) float64
+        In the pass's coordinates; `brought` is what a white surface facing a point squarely at distance 1 shows.
+    """
+
+    def __init__(self, scene: Scene, view: View, surfaces: Surfaces, numbers: FloatArray) -> None:
+        values = light_values(scene, view, surfaces.anchor)
+        which = np.searchsorted(values[1:, CHANCES_BEFORE], numbers[:, 0], side="right")
+        chosen = values[which]
+        chance = chosen[:, CHANCE : CHANCE + 1]
+        drawn = chance > 0.0
+        u = np.minimum((numbers[:, :1] - chosen[:, CHANCES_BEFORE, None]) / np.where(drawn, chance, 1.0), 1.0)
+        corner, one, other = (chosen[:, k : k + 3] for k in (CORNER, EDGE_1, EDGE_2))
+        unit = surfaces.unit
+        self.places = (corner + u * one + numbers[:, 1:] * other) / unit
+        self.normals = chosen[:, LIGHT_NORMAL : LIGHT_NORMAL + 3]
+        area = chosen[:, AREA, None] / unit**2 / (np.pi * len(numbers))
+        self.brought = np.where(drawn, chosen[:, RADIANCE : RADIANCE + 3] * area / np.where(drawn, chance, 1.0), 0.0)
+
+
+class Lighting:
+    """The lights of a scene on the device; made and used inside the context's `use`.
+
+    Attributes
+    ----------
+    text : str
+        The shader's functions.
+    """
+
+    def __init__(
+        self,
+        context: GraphicsContext,
+        scene: Scene,
+        technique: Technique,
+        surfaces: Surfaces,
+        shadings: dict[str | None, Shading],
+        slot: int,
+    ) -> None:
+        self._scene, self._technique, self._surfaces, self._slot = scene, technique, surfaces, slot
+        cut = _cutouts(scene)
+        holed = np.array([o.texture in cut for o in scene.objects], dtype=bool)[surfaces.owners]
+        self._solid = np.flatnonzero(~holed)
+        self._cut = [
+            np.flatnonzero(np.array([o.texture == name for o in scene.objects])[surfaces.owners]) for name in cut
+        ]
+        self._images = [image for name in cut if (image := shadings[name].image) is not None]
+        self._cut_uv = [_coordinates(surfaces, shadings[name], mine) for name, mine in zip(cut, self._cut, strict=True)]
+        self._lit = surfaces.kinds == DIFFUSE
+        self._groups = -(-len(self._solid) // GROUP)
+        self._version = 0
+        first = _HEADER + self._groups * (1 + 3 * GROUP)
+        self._first_cut = first
+        width = first + 4 * sum(len(c) for c in self._cut)
+        self._points = context.gl.texture((width, technique.shadow_rays), 4, dtype="f4")
+        self._points.filter = (context.gl.NEAREST, context.gl.NEAREST)
+        self.text = self._make_text(cut, shadings)
+
+    def _make_text(self, cut: list[str], shadings: dict[str | None, Shading]) -> str:
+        lines = ["#define EXACT 0", "#define SHADOWS EXACT", f"#define GROUP {GROUP}"]
+        lines += [f"#define FIRST_GROUP {_HEADER}", f"#define FIRST_TRIANGLE {_HEADER + self._groups}"]
+        light = read_shader("light.glsl")
+        declared, rest = light.split("#if SHADOWS", 1)
+        functions, at = [], self._first_cut
+        for k, (name, mine) in enumerate(zip(cut, self._cut, strict=True)):
+            text = read_shader("cutouts.glsl")
+            values = {
+                "IMAGE_NAME": f"cutout_{k}",
+                "FUNCTION_NAME": f"is_behind_cutout_{k}",
+                "FIRST_TEXEL": at,
+                "END_TEXEL": at + 4 * len(mine),
+                "TEXEL_MODE": shadings[name].mode,
+                "CUTOFF": repr(shadings[name].uniforms["alpha_cutoff"]),
+            }
+            for word, value in values.items():
+                text = text.replace(word, str(value))
+            functions.append(text)
+            at += 4 * len(mine)
+        calls = " || ".join(f"is_behind_cutout_{k}(row, back, most)" for k in range(len(cut))) or "false"
+        functions.append(f"bool is_behind_cutouts(int row, vec3 back, float most) {{ return {calls}; }}\n")
+        return "\n".join(lines) + "\n" + declared + "".join(functions) + "#if SHADOWS" + rest
+
+    def update(self, exposure: Exposure, frame: int) -> None:
+        """Draw the pass's points on the lights, and find what may hide them."""
+        scene, surfaces = self._scene, self._surfaces
+        # as the ray tracer turns lights: by the view in which the shutter opens
+        view = view_at(scene.camera, scene.animation, frame, _opening(scene, self._technique), (1, 1))
+        points = LightPoints(scene, view, surfaces, exposure.lights)
+        if self._version != surfaces.version:
+            self._version = surfaces.version
+            self._solid = self._solid[neighbours_order(surfaces.corners[self._solid])]
+        rows = np.zeros((self._points.height, self._points.width, 4), np.float32)
+        rows[:, 0, :3], rows[:, 1, :3], rows[:, 2, :3] = points.places, points.brought, points.normals
+        if self._lit.any():
+            lit = box_corners(surfaces.corners[self._lit])
+            self._write_solid(points, lit, rows)
+            self._write_cutouts(points, lit, rows)
+        self._points.write(rows.tobytes())
+
+    def _write_solid(self, points: LightPoints, lit: FloatArray, rows: np.ndarray) -> None:
+        corners = self._surfaces.corners[self._solid]
+        shares, may_hide = pyramids(corners, lit, points.places, points.normals)
+        first = _HEADER + self._groups
+        for row, place, mine, chosen in zip(rows, points.places, shares, may_hide, strict=True):
+            kept = np.flatnonzero(chosen)
+            count = -(-len(kept) // GROUP)
+            row[0, 3] = count
+            row[first : first + 3 * len(kept), :3] = mine[kept].reshape(-1, 3)
+            if count:
+                # the last group is filled up with its last triangle
+                padded = np.concatenate([kept, np.repeat(kept[-1:], count * GROUP - len(kept))])
+                row[_HEADER : _HEADER + count] = cones((corners[padded] - place).reshape(count, GROUP, 3, 3))
+
+    def _write_cutouts(self, points: LightPoints, lit: FloatArray, rows: np.ndarray) -> None:
+        at = self._first_cut
+        for mine, uv in zip(self._cut, self._cut_uv, strict=True):
+            shares, _ = pyramids(self._surfaces.corners[mine], lit, points.places, points.normals)
+            texels = rows[:, at : at + 4 * len(mine)].reshape(len(rows), len(mine), 4, 4)
+            texels[:, :, :3, :3] = shares
+            texels[:, :, :3, 3], texels[:, :, 3, :3] = uv[..., 0], uv[..., 1]
+            rows[:, at : at + 4 * len(mine)] = texels.reshape(len(rows), -1, 4)
+            at += 4 * len(mine)
+
+    def use(self) -> dict[str, int]:
+        """Bind what shaders read; return the uniforms that say where it is."""
+        self._points.use(self._slot)
+        uniforms = {"lights": self._slot, "light_points": self._points.height}
+        for k, image in enumerate(self._images):
+            image.use(_FIRST_SLOT + k)
+            uniforms[f"cutout_{k}"] = _FIRST_SLOT + k
+        return uniforms
+
+    def release(self) -> None:
+        """Free everything."""
+        self._points.release()
+
+
+def _cutouts(scene: Scene) -> list[str]:
+    """Return the names of the textures with holes that objects have."""
+    found: dict[str, None] = {}
+    for surface in scene.objects:
+        if surface.texture is not None:
+            texture = scene.textures[surface.texture]
+            if isinstance(texture, ImageTexture) and texture.alpha_cutoff is not None:
+                found[surface.texture] = None
+    if len(found) > _MOST_CUTOUTS:
+        raise UnsupportedScene(
+            f"raster: {len(found)} cut-out textures under lights are not drawn; up to {_MOST_CUTOUTS} are"
+        )
+    return list(found)
+
+
+def _coordinates(surfaces: Surfaces, shading: Shading, mine: np.ndarray) -> FloatArray:
+    """Return (m, 3, 2) texture coordinates of triangles: of each the whole part is taken off where it may."""
+    out = np.array([shader_coordinates(shading, uv) for uv in surfaces.uv[mine]])
+    return out.reshape(-1, 3, 2)
+
+
+def _opening(scene: Scene, technique: Technique) -> float:
+    """Return when the first sample may lie, as a fraction of the frame interval; see the ray tracer's `exposure`."""
+    single = technique.passes == 1 and technique.sampler in ("center", "grid")
+    return scene.animation.shutter / 2 if technique.time == "center" or single else 0.0
