@@ -214,7 +214,7 @@ def _cut_body(
     if not perspective:
         _check_size(corners[..., :4], owners, sides)
     for side in (*sides, (0.0, 0.0, -1.0, 1.0) if perspective else (0.0, 0.0, 1.0, 0.0)):
-        corners, owners = _cut_side(corners, owners, side)
+        corners, owners = cut_side(corners, owners, side)
     return corners, owners
 
 
@@ -229,7 +229,7 @@ def _check_size(place: FloatArray, owners: NDArray[np.int32], sides: Sequence[Se
         )
 
 
-def _cut_side(
+def cut_side(
     corners: FloatArray, owners: NDArray[np.int32], side: Sequence[float]
 ) -> tuple[FloatArray, NDArray[np.int32]]:
     """Return what of triangles (m, 3, n) lies where `side` . (x, y, z, w) >= 0, as triangles, and their objects."""

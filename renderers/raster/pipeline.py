@@ -14,17 +14,16 @@ from numpy.typing import NDArray
 from aliasbench.renderers.geometry import Body
 from aliasbench.renderers.raster.alpha_coverage import ALPHA_TO_COVERAGE, coverage_excess
 from aliasbench.renderers.raster.answers import make_light
-from aliasbench.renderers.raster.graphics import GraphicsContext, read_shader
+from aliasbench.renderers.raster.graphics import GraphicsContext
 from aliasbench.renderers.raster.guard import BoolArray, Pieces
 from aliasbench.renderers.raster.minification import (
-    KINDS,
-    MODES,
     Shading,
     make_shading,
     piece_coordinates,
     shader_coordinates,
 )
 from aliasbench.renderers.raster.projection import pack_matrices
+from aliasbench.renderers.raster.shaders import scene_shader
 from aliasbench.renderers.technique import Technique
 from aliasbench.scenes.errors import InputError
 from aliasbench.scenes.model import FloatArray, Scene
@@ -35,27 +34,30 @@ _VERTEX = np.dtype([("position", "3f4"), ("texcoord", "2f4"), ("color", "3f4"), 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Batch:
-    """The triangles with one texture, (m, 3) vertex numbers in `triangles`, and the object of each in `owners`."""
+    """The triangles with one texture, (m, 3) vertex numbers in `triangles`, and the object of each in `owners`.
+
+    A glossy object, then named by `gloss`, is one of its own.
+    """
 
     array: moderngl.VertexArray
     index: moderngl.Buffer
     shading: Shading
     triangles: NDArray[np.int32]
     owners: NDArray[np.int32]
-
-
-def _shader(name: str, shading: Shading, defined: Sequence[str] = (), before: str = "") -> str:
-    names = [*KINDS, *MODES]
-    lines = ["#version 330 core", *(f"#define {n} {i}" for i, n in enumerate(names))]
-    lines += [f"#define KIND {shading.kind}", f"#define MODE {shading.mode}", *(f"#define {n}" for n in defined)]
-    lines += [f"#define COVERAGE {int(shading.is_coverage)}"]
-    return "\n".join(lines) + "\n" + before + "#line 1\n" + read_shader(name)
+    gloss: int | None
 
 
 class SceneBuffers:
     """A scene's bodies on the device, drawn with `draw`; made and used inside the context's `use`."""
 
-    def __init__(self, context: GraphicsContext, scene: Scene, bodies: Sequence[Body], technique: Technique) -> None:
+    def __init__(
+        self,
+        context: GraphicsContext,
+        scene: Scene,
+        bodies: Sequence[Body],
+        technique: Technique,
+        size: tuple[int, int],
+    ) -> None:
         gl = context.gl
         self._context = context
         texture_names = [s.texture for s in scene.objects]
@@ -63,7 +65,7 @@ class SceneBuffers:
             name: make_shading(gl, scene, name, technique, context.max_texture_size)
             for name in dict.fromkeys(texture_names)
         }
-        self.light = make_light(context, scene, bodies, technique, shadings)
+        self.light = make_light(context, scene, bodies, technique, shadings, size)
         vertices, triangles, surfaces = _gather(
             scene, bodies, [shadings[n] for n in texture_names], apart=self.light is not None
         )
@@ -71,10 +73,12 @@ class SceneBuffers:
         self._batches: list[_Batch] = []
         self._colors = np.array([s.color for s in scene.objects]).reshape(-1, 3)
         self._left_out = np.zeros(len(scene.objects), dtype=bool)
-        for name, shading in shadings.items():
-            chosen = np.array([n == name for n in texture_names], dtype=bool)[surfaces]
+        glossy = [k if s.material.kind == "glossy" else None for k, s in enumerate(scene.objects)]
+        kinds = list(zip(texture_names, glossy, strict=True))
+        for name, gloss in dict.fromkeys(kinds):
+            chosen = np.array([kind == (name, gloss) for kind in kinds], dtype=bool)[surfaces]
             if chosen.any():
-                self._batches.append(self._make_batch(triangles[chosen], surfaces[chosen], shading))
+                self._batches.append(self._make_batch(triangles[chosen], surfaces[chosen], shadings[name], gloss))
         self._shadings = tuple(shadings.values())
         if any(s.is_coverage for s in self._shadings):
             excess = coverage_excess(context, technique.msaa)
@@ -89,14 +93,16 @@ class SceneBuffers:
         self._matrices = gl.texture((4 * self._row_length, rows), 4, dtype="f4")
         self._matrices.filter = (moderngl.NEAREST, moderngl.NEAREST)
 
-    def _make_batch(self, triangles: NDArray[np.int32], owners: NDArray[np.int32], shading: Shading) -> _Batch:
-        defined, before = ((), "") if self.light is None else (self.light.defined, self.light.text)
+    def _make_batch(
+        self, triangles: NDArray[np.int32], owners: NDArray[np.int32], shading: Shading, gloss: int | None
+    ) -> _Batch:
+        defined, before = ((), "") if self.light is None else self.light.shader(gloss)
         program = self._context.program(
-            _shader("scene.vert.glsl", shading, defined), _shader("scene.frag.glsl", shading, defined, before)
+            scene_shader("scene.vert.glsl", shading, defined), scene_shader("scene.frag.glsl", shading, defined, before)
         )
         index = self._context.gl.buffer(np.ascontiguousarray(triangles).tobytes())
         array = self._make_array(program, self._vertices, index)
-        return _Batch(array, index, shading, triangles, owners)
+        return _Batch(array, index, shading, triangles, owners, gloss)
 
     def _make_array(
         self, program: moderngl.Program, vertices: moderngl.Buffer | None, index: moderngl.Buffer | None
@@ -121,6 +127,8 @@ class SceneBuffers:
         for batch in self._batches:
             program = batch.array.program
             values = {**batch.shading.uniforms, "matrices": 0, "image": 1, **placing}
+            if self.light is not None and batch.gloss is not None:
+                values |= self.light.use_mirror(batch.gloss)
             for name, value in values.items():
                 if name in program:
                     program[name] = value

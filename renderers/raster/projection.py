@@ -129,14 +129,20 @@ def _compose(
     # Frobenius norm: no direction is stretched by more
     reach = np.linalg.norm(local[:, :3, 3], axis=1) + placement.radii * np.linalg.norm(local[:, :3, :3], axis=(1, 2))
     farthest = max(float(reach.max(initial=0.0)), _LEAST_DISTANT)
-    camera = np.eye(4)
-    camera[:3, :3] = np.stack([view.right, view.up, view.forward])
-    clip = np.repeat((_projection(view, farthest, instant.jitter, window) @ camera)[None], len(local), axis=0)
+    clip = np.repeat(view_matrix(view, farthest, instant.jitter, window)[None], len(local), axis=0)
     # layer k is nearer by k steps of its distance: only the row of depth changes, never where a point is drawn
     closer = 1.0 - LAYER_STEP * placement.layers
     clip[:, 2] *= (1.0 / closer if view.perspective else closer)[:, None]
     out: FloatArray = clip @ local
     return out, farthest
+
+
+def view_matrix(view: View, farthest: float, jitter: tuple[float, float], window: Window) -> FloatArray:
+    """Return the (4, 4) matrix to clip space from world coordinates relative to the eye, none above `farthest`."""
+    camera = np.eye(4)
+    camera[:3, :3] = np.stack([view.right, view.up, view.forward])
+    out: FloatArray = _projection(view, farthest, jitter, window) @ camera
+    return out
 
 
 def _projection(view: View, farthest: float, jitter: tuple[float, float], window: Window) -> FloatArray:

@@ -22,6 +22,7 @@ from aliasbench.renderers.lights import with_lights
 from aliasbench.renderers.raster.context import acquire_context, check_samples
 from aliasbench.renderers.raster.exposures import Exposure, Exposures
 from aliasbench.renderers.raster.filtering import make_optics
+from aliasbench.renderers.raster.gloss import check_gloss
 from aliasbench.renderers.raster.graphics import GraphicsContext
 from aliasbench.renderers.raster.guard import Guard
 from aliasbench.renderers.raster.pipeline import SceneBuffers
@@ -83,11 +84,12 @@ def _check_drawn(scene: Scene) -> None:
         raise UnsupportedScene(
             f"raster: diffuse interreflection (bounces = {scene.bounces}) is not drawn; direct light alone is"
         )
+    check_gloss(scene)
     for index, surface in enumerate(scene.objects):
-        if surface.material.kind not in ("unlit", "diffuse"):
+        if surface.material.kind == "glass":
             raise UnsupportedScene(
                 f"raster: material {surface.material.kind} (object {surface.name or f'number {index}'}) is not drawn; "
-                "unlit and diffuse are"
+                "unlit, diffuse and glossy are"
             )
 
 
@@ -139,7 +141,7 @@ class RasterScene:
             context.release_left_over()
             self._target = Target(context, self._layout, technique, depth_rule(scene.camera), self._optics)
             made.callback(self._target.release)
-            self._buffers = SceneBuffers(context, scene, bodies, technique)
+            self._buffers = SceneBuffers(context, scene, bodies, technique, self._layout.full)
             # compiles the kernels at the first call of a process: that is no rendering
             Exposures(technique, self._optics, 0, 0)
             gl.finish()

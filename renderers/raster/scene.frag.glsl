@@ -130,6 +130,12 @@ vec3 answer() {
     if (place.kind == LIGHT) {
         return vec3(place.is_front ? 1.0 : 0.0);
     }
+#ifdef GLOSS
+    return gloss_at(place.along);
+#endif
+    if (place.kind == GLOSSY) {
+        return vec3(0.0);
+    }
 #ifdef LIT
     if (place.kind == DIFFUSE) {
         return place.is_sure ? light_at(place) : vec3(0.0);
