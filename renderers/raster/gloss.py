@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from aliasbench.renderers.geometry import LAYER_STEP, Body
 from aliasbench.renderers.lights import OFF_SURFACE
-from aliasbench.renderers.raster.graphics import GraphicsContext, read_shader
+from aliasbench.renderers.raster.graphics import GraphicsContext, GraphicsError, read_shader
 from aliasbench.renderers.raster.guard import cut_side
 from aliasbench.renderers.raster.minification import Shading, piece_coordinates
 from aliasbench.renderers.raster.projection import DepthRule, Window, view_matrix
@@ -30,7 +30,7 @@ from aliasbench.renderers.raster.targets import Surface as Drawing
 from aliasbench.renderers.raster.virtual_images import Mirror, refine
 from aliasbench.renderers.raytrace.scattering import frame_of
 from aliasbench.renderers.sampling.discs import disc_point
-from aliasbench.scenes.errors import UnsupportedScene
+from aliasbench.scenes.errors import InputError, UnsupportedScene
 from aliasbench.scenes.model import FloatArray, Scene, Vec2
 from aliasbench.scenes.projection import View
 
@@ -241,7 +241,15 @@ class Gloss:
         }
         numbers = [k for k, o in enumerate(scene.objects) if o.material.kind == "glossy"]
         with ExitStack() as made:
-            self.polygons = {k: Glossy(context, scene, k, size, rule, made) for k in numbers}
+            try:
+                self.polygons = {k: Glossy(context, scene, k, size, rule, made) for k in numbers}
+                context.check("making pictures of what is mirrored")
+            except (moderngl.Error, GraphicsError) as error:
+                context.gl.clear_errors()
+                raise InputError(
+                    f"{len(numbers)} glossy polygons: this device ({context.renderer}) cannot hold a picture of "
+                    f"{size[0]}x{size[1]} pixels for each ({error}); choose a smaller size"
+                ) from None
             made.pop_all()
 
     def update(self, uniforms: Uniforms, numbers: Vec2, view: View, window: Window, jitter: Vec2, frame: int) -> None:

@@ -9,7 +9,7 @@ uniform sampler2D lights;
 uniform int light_points;
 
 #if SHADOWS == EXACT
-bool is_hidden(int row, int groups, vec3 back, float most) {
+bool is_hidden(int row, int groups, vec3 back, float most, vec3 normal) {
     float far = length(back);
     for (int g = 0; g < groups; g++) {
         vec4 cone = texelFetch(lights, ivec2(FIRST_GROUP + g, row), 0);
@@ -27,6 +27,31 @@ bool is_hidden(int row, int groups, vec3 back, float most) {
     }
     return is_behind_cutouts(row, back, most);
 }
+#else
+uniform sampler2D shadow_map;
+const float STEEPEST = 64.0;     // a surface seen more edge-on than that is hardly lit
+
+bool is_hidden(int row, int faces, vec3 back, float most, vec3 normal) {
+    for (int f = 0; f < faces; f++) {
+        int at = FIRST_GROUP + FACE_TEXELS * f;
+        vec4 x = texelFetch(lights, ivec2(at, row), 0), y = texelFetch(lights, ivec2(at + 1, row), 0);
+        vec4 z = texelFetch(lights, ivec2(at + 2, row), 0), cell = texelFetch(lights, ivec2(at + 3, row), 0);
+        float depth = dot(z.xyz, back);
+        vec2 width = vec2(1.0 / z.w, 1.0 / cell.z);
+        vec2 place = (vec2(dot(x.xyz, back), dot(y.xyz, back)) / depth - vec2(x.w, y.w)) / width;
+        if (depth > 0.0 && all(greaterThanEqual(place, vec2(0.0))) && all(lessThan(place, vec2(1.0)))) {
+            float stored = texelFetch(shadow_map, ivec2(cell.xy + floor(place * cell.w)), 0).x;
+            // a plane n . X = k has depth k / (n . d) along d = z + s x + t y, which changes with s by
+            // -depth (n . x) / (n . d); a texel's middle is at most half of it away
+            vec2 texel = width / cell.w;
+            float towards = max(abs(dot(normal, back)) / depth, 1e-6);
+            float slope = dot(abs(vec2(dot(normal, x.xyz), dot(normal, y.xyz))), texel) / towards;
+            float bias = 0.5 * (min(slope, STEEPEST * max(texel.x, texel.y)) + max(texel.x, texel.y));
+            return stored < depth * (1.0 - bias);
+        }
+    }
+    return false;
+}
 #endif
 
 vec3 light_at(Place place) {
@@ -42,7 +67,7 @@ vec3 light_at(Place place) {
             // far from where coordinates start, the light's own surface may lie before it by rounding
             float unsure = (off + OFF_SURFACE * largest(point.xyz)) * inversesqrt(square);
             vec3 back = place.point + off * place.normal - point.xyz;
-            if (!is_hidden(row, int(point.w), back, 1.0 / max(BEFORE_LIGHT, unsure))) {
+            if (!is_hidden(row, int(point.w), back, 1.0 / max(BEFORE_LIGHT, unsure), place.normal)) {
                 sum += texelFetch(lights, ivec2(1, row), 0).xyz * ((here / square) * (there / square));
             }
         }

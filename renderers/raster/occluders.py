@@ -41,6 +41,22 @@ def box_corners(points: FloatArray) -> FloatArray:
     return np.array([[ends[i, 0], ends[j, 1], ends[k, 2]] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
 
 
+def may_come_between(corners: FloatArray, lit: FloatArray, points: FloatArray, normals: FloatArray) -> BoolArray:
+    """Return (k, m) which triangles may come between each light point and what is lit; arguments as `pyramids` has."""
+    slack = OFF_SURFACE * float(max(np.abs(corners).max(initial=0.0), np.abs(lit).max(initial=0.0)))
+    heights = np.einsum("mij,kj->kmi", corners, normals).max(axis=2, initial=-np.inf)
+    before = heights - np.einsum("ki,ki->k", points, normals)[:, None] > slack
+    plane = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    length = np.linalg.norm(plane, axis=1, keepdims=True)
+    plane = np.divide(plane, length, out=np.zeros_like(plane), where=length > 0.0)
+    offsets = np.einsum("mi,mi->m", plane, corners[:, 0])
+    beyond = lit @ plane.T - offsets  # (n, m)
+    here = points @ plane.T - offsets  # (k, m)
+    above, below = beyond.min(axis=0) < -slack, beyond.max(axis=0) > slack
+    out: BoolArray = before & np.where(here > 0.0, above, below)
+    return out
+
+
 def pyramids(
     corners: FloatArray, lit: FloatArray, points: FloatArray, normals: FloatArray
 ) -> tuple[FloatArray, BoolArray]:
@@ -66,17 +82,7 @@ def pyramids(
     shares = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=2)
     volume = np.einsum("kmi,kmi->km", a, shares[:, :, 0])
     size = np.linalg.norm(edges, axis=3).prod(axis=2)
-    slack = OFF_SURFACE * float(max(np.abs(corners).max(initial=0.0), np.abs(lit).max(initial=0.0)))
-    before = np.einsum("kmij,kj->kmi", edges, normals).max(axis=2, initial=-np.inf) > slack
-    plane = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    length = np.linalg.norm(plane, axis=1, keepdims=True)
-    plane = np.divide(plane, length, out=np.zeros_like(plane), where=length > 0.0)
-    offsets = np.einsum("mi,mi->m", plane, corners[:, 0])
-    beyond = lit @ plane.T - offsets  # (n, m)
-    here = points @ plane.T - offsets  # (k, m)
-    above, below = beyond.min(axis=0) < -slack, beyond.max(axis=0) > slack
-    between = np.where(here > 0.0, above, below)
-    may_hide = before & between & (np.abs(volume) > _FLAT * size)
+    may_hide = may_come_between(corners, lit, points, normals) & (np.abs(volume) > _FLAT * size)
     shares = np.divide(shares, volume[:, :, None, None], out=np.zeros_like(shares), where=may_hide[:, :, None, None])
     return shares, may_hide
 
