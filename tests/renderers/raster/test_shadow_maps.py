@@ -104,11 +104,8 @@ def test_a_lit_plane_does_not_shade_itself():
     tilted = polygon([(-3, -1, 3), (3, 1, 3), (3, 1, -3), (-3, -1, -3)], material=Material("diffuse"))
     lamp = Light(((-3, 1.4, -0.5), (-2.5, 1.4, -0.5), (-2.5, 1.4, 0.5), (-3, 1.4, 0.5)), (5.0, 5.0, 5.0))
     camera = Camera("orthographic", position=(0.0, 4.0, 2.0), target=(0.0, 0.0, 0.0), height=3.0)
-    for objects in (
-        (floor,),
-        (tilted,),
-        (floor, replace(tilted, vertices=read_only(tilted.vertices + np.array([0, 1.2, 0])))),
-    ):
+    roof = replace(tilted, vertices=read_only(tilted.vertices + np.array([0, 1.2, 0])))
+    for objects in ((floor,), (tilted,), (floor, roof)):
         scene = Scene("plane", camera, objects, lights=(lamp,))
         traced = render(scene, "raytrace:pattern=shared,spp=4,sampler=sobol", size=(60, 60)).pixels
         drawn = render(scene, "raster:passes=4,sampler=sobol", size=(60, 60)).pixels
