@@ -14,7 +14,7 @@ in int triangle;
 
 flat out vec3 surface_color;
 out vec2 center_coordinate;
-centroid out vec2 coordinate;
+centroid out vec4 centroid_place;
 flat out int surface_triangle;
 
 void main() {
@@ -34,6 +34,6 @@ void main() {
     gl_Position.z *= nearer;
     surface_color = color;
     center_coordinate = texcoord;
-    coordinate = texcoord;
+    centroid_place = vec4(texcoord, triangle < 0 ? 0.0 : 1.0, gl_Position.w);  // as in scene.vert.glsl
     surface_triangle = triangle;
 }
