@@ -33,6 +33,7 @@ TECHNIQUES: Mapping[str, str] = {
     "raster-passes-4": "raster:passes=4,sampler=jittered",
     "raster-passes-16": "raster:passes=16,sampler=jittered",
     "raster-passes-64": "raster:passes=64,sampler=jittered",
+    "raster-fxaa": "raster:post=fxaa",
 }
 
 MAX_SIDE = 65536

@@ -27,6 +27,7 @@ from aliasbench.renderers.raster.graphics import GraphicsContext
 from aliasbench.renderers.raster.guard import Guard
 from aliasbench.renderers.raster.pipeline import SceneBuffers
 from aliasbench.renderers.raster.placement import make_placement
+from aliasbench.renderers.raster.post import Post, check_whole
 from aliasbench.renderers.raster.projection import (
     MOST_DISTANT,
     Instant,
@@ -39,7 +40,7 @@ from aliasbench.renderers.raster.targets import Target, make_layout
 from aliasbench.renderers.sampling.patterns import sampler_code
 from aliasbench.renderers.sampling.warps import IDENTITY
 from aliasbench.renderers.technique import Technique
-from aliasbench.scenes.errors import InputError, NotAvailableError, UnsupportedScene
+from aliasbench.scenes.errors import InputError, UnsupportedScene
 from aliasbench.scenes.model import FloatArray, Scene
 from aliasbench.scenes.motion import shutter_fraction
 
@@ -70,10 +71,6 @@ def prepare_raster(scene: Scene, technique: Technique, size: tuple[int, int]) ->
 
 
 def _check_available(scene: Scene, technique: Technique) -> None:
-    missing = ((technique.post != "none", f"post={technique.post}", "post=none"),)
-    for wanted, feature, available in missing:
-        if wanted:
-            raise NotAvailableError(f"raster: {feature} is not available yet; available: {available}")
     sampler_code(technique.sampler)
     _check_drawn(scene)
 
@@ -134,6 +131,8 @@ class RasterScene:
         self._context, self._scene, self._technique, self._size = context, scene, technique, size
         self._optics = make_optics(technique)
         self._layout = make_layout(context, size, technique, self._optics)
+        if technique.post != "none":
+            check_whole(context, size, technique, self._optics)
         bodies = build_bodies(scene)
         self._placement = make_placement(bodies)
         self._parts = [self._make_part(*corner) for corner in self._layout.corners(size)]
@@ -141,6 +140,9 @@ class RasterScene:
             context.release_left_over()
             self._target = Target(context, self._layout, technique, depth_rule(scene.camera), self._optics)
             made.callback(self._target.release)
+            self._post = None if technique.post == "none" else Post(context, technique, self._target, size)
+            if self._post is not None:
+                made.callback(self._post.release)
             self._buffers = SceneBuffers(context, scene, bodies, technique, self._layout.full)
             # compiles the kernels at the first call of a process: that is no rendering
             Exposures(technique, self._optics, 0, 0)
@@ -148,7 +150,7 @@ class RasterScene:
             context.check("uploading the scene")
             made.pop_all()
         # frees nothing itself: the collector may run while another context is current
-        self._forgotten = weakref.finalize(self, _leave, context, self._buffers.release, self._target.release)
+        self._forgotten = weakref.finalize(self, _leave, context, *self._releases())
         self._forgotten.atexit = False
         self._sums: FloatArray | None = None
         self._setup_seconds = perf_counter() - start
@@ -204,7 +206,8 @@ class RasterScene:
         for number in range(len(exposures)):
             exposure = exposures[number]
             weight = exposure.weight * self._draw_pass(part, frame, exposure)
-            self._target.read_into(drawn)
+            if self._post is None or sums is not None:
+                self._target.read_into(drawn)
             if sums is not None:
                 if exposure.weight != 1.0:
                     np.multiply(drawn, np.float32(exposure.weight), out=drawn)
@@ -221,7 +224,11 @@ class RasterScene:
             )
         if sums is not None:
             np.multiply(sums, 1.0 / weights, out=drawn, casting="same_kind")
-        elif weights != 1.0 or exposures[0].weight != 1.0:
+        if self._post is not None:
+            scale = exposures[0].weight / weights if sums is None else 1.0
+            self._post.run(scale, drawn)
+            self._post.read_into(drawn)
+        elif sums is None and (weights != 1.0 or exposures[0].weight != 1.0):
             np.multiply(drawn, np.float32(exposures[0].weight / weights), out=drawn)
         if not whole:
             height, width = (s.stop - s.start for s in part.place)
@@ -259,8 +266,12 @@ class RasterScene:
         """Free what the scene holds on the device; a second call does nothing."""
         with self._context.use():
             if self._forgotten.detach() is not None:
-                self._buffers.release()
-                self._target.release()
+                for release in self._releases():
+                    release()
+
+    def _releases(self) -> list[Callable[[], None]]:
+        post = [] if self._post is None else [self._post.release]
+        return [self._buffers.release, self._target.release, *post]
 
     def __enter__(self) -> Self:
         return self

@@ -36,8 +36,8 @@ def wrapped_positions(positions: FloatArray, jitter: Jitter) -> tuple[FloatArray
 class Image:
     """A picture of one sample a pixel; `made` frees what there is already when the rest cannot be made."""
 
-    def __init__(self, context: GraphicsContext, size: tuple[int, int], made: ExitStack) -> None:
-        self.color: Any = context.gl.texture(size, 4, dtype="f4")
+    def __init__(self, context: GraphicsContext, size: tuple[int, int], made: ExitStack, components: int = 4) -> None:
+        self.color: Any = context.gl.texture(size, components, dtype="f4")
         made.callback(self.color.release)
         self.framebuffer = context.gl.framebuffer([self.color])
         made.callback(self.framebuffer.release)
@@ -89,10 +89,11 @@ class ScreenStage:
         size: tuple[int, int],
         made: ExitStack,
         shader: str,
+        components: int = 4,
         **constants: int,
     ) -> None:
         self._source = source
-        self.output = Image(context, size, made)
+        self.output = Image(context, size, made, components)
         lines = ["#version 330 core", *(f"#define {name} {value}" for name, value in constants.items()), "#line 1\n"]
         self._program = context.program(
             *("\n".join(lines) + read_shader(name) for name in ("screen.vert.glsl", shader))

@@ -1,7 +1,9 @@
 """Scenes of a few polygons and what they must look like, point by point, computed in float64 without any renderer."""
 
+import importlib.util
 from collections.abc import Callable, Iterator
-from types import SimpleNamespace
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
 
 import numpy as np
 import pytest
@@ -83,6 +85,17 @@ def make() -> SimpleNamespace:
         perspective=PERSPECTIVE,
         moving=Animation(fps=24.0, frames=3, shutter=0.75),
     )
+
+
+@pytest.fixture(scope="session")
+def processing() -> ModuleType:
+    """The module `processing` beside this file."""
+    spec = importlib.util.spec_from_file_location("raster_processing", Path(__file__).with_name("processing.py"))
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
 
 
 @pytest.fixture

@@ -13,7 +13,7 @@ from aliasbench.renderers.raster.filtering import make_optics
 from aliasbench.renderers.raster.projection import DepthRule
 from aliasbench.renderers.raster.targets import Target, make_layout
 from aliasbench.renderers.technique import parse_technique
-from aliasbench.scenes.errors import InputError, NotAvailableError, UnsupportedScene
+from aliasbench.scenes.errors import InputError, UnsupportedScene
 from aliasbench.scenes.model import Material
 
 pytestmark = pytest.mark.usefixtures("gl_checked")
@@ -68,17 +68,6 @@ def test_forgotten_scenes_are_freed_by_the_next(make):
     assert len(context._left_over) == 2
     with prepare(make.star(), "raster", size=SIZE):
         assert not context._left_over
-
-
-@pytest.mark.parametrize(
-    ("technique", "feature"),
-    [
-        ("raster:post=fxaa", "post=fxaa"),
-    ],
-)
-def test_features_that_are_not_there_yet_say_what_is(make, technique, feature):
-    with pytest.raises(NotAvailableError, match=f"{feature} is not available yet; available: "):
-        prepare(make.star(), technique, size=SIZE)
 
 
 def test_materials_and_lights_that_are_not_drawn_are_named(make):
