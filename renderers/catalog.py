@@ -34,6 +34,7 @@ TECHNIQUES: Mapping[str, str] = {
     "raster-passes-16": "raster:passes=16,sampler=jittered",
     "raster-passes-64": "raster:passes=64,sampler=jittered",
     "raster-fxaa": "raster:post=fxaa",
+    "raster-smaa": "raster:post=smaa",
 }
 
 MAX_SIDE = 65536

@@ -99,6 +99,31 @@ class Fxaa:
         self._blend.release()
 
 
+class Smaa:
+    """SMAA 1x (Jimenez et al. 2012) with its finest thresholds: luma edges, orthogonal patterns and sharp corners."""
+
+    def __init__(self, context: GraphicsContext, source: Image, size: tuple[int, int], made: ExitStack) -> None:
+        luma = PostStage(context, source, size, made, "luma.frag.glsl", 1)
+        edges = PostStage(context, luma.output, size, made, "smaa_edges.frag.glsl", 2)
+        areas = PostStage(context, edges.output, size, made, "smaa_areas.frag.glsl")
+        blend = PostStage(context, source, size, made, "smaa_blend.frag.glsl", areas=areas.output)
+        self._steps = (luma, edges, areas, blend)
+        self.output = blend.output
+
+    def run(self, scale: float, /) -> None:
+        """See `Filter`."""
+        for step in self._steps:
+            step.apply(scale)
+
+    def release(self) -> None:
+        """See `Filter`."""
+        for step in self._steps:
+            step.release()
+
+
+_FILTERS = {"fxaa": Fxaa, "smaa": Smaa}
+
+
 class Post:
     """The processing that a technique asks for, of pictures of one size."""
 
@@ -108,7 +133,7 @@ class Post:
             try:
                 if technique.passes > 1:
                     self._uploaded = Uploaded(context, size, made)
-                self._filter = Fxaa(context, self._uploaded or target.output, size, made)
+                self._filter: Filter = _FILTERS[technique.post](context, self._uploaded or target.output, size, made)
                 context.check("making the pictures to process")
             except (moderngl.Error, GraphicsError) as error:
                 context.gl.clear_errors()

@@ -6,12 +6,12 @@ import pytest
 
 from aliasbench.renderers.catalog import prepare, render
 from aliasbench.renderers.raster import post, targets
-from aliasbench.renderers.raster.post import Fxaa
+from aliasbench.renderers.raster.post import Fxaa, Smaa
 from aliasbench.scenes.errors import InputError
 from aliasbench.scenes.files import load_scene
 
 pytestmark = pytest.mark.usefixtures("gl_checked")
-KINDS = {"fxaa": Fxaa}
+KINDS = {"fxaa": Fxaa, "smaa": Smaa}
 each_kind = pytest.mark.parametrize("kind", KINDS.values(), ids=KINDS)
 each_name = pytest.mark.parametrize("name", KINDS)
 
@@ -118,6 +118,6 @@ def test_processing_that_finds_no_memory_is_refused(make, monkeypatch):
     def refuse(*_arguments, **_options):
         raise moderngl.Error("the framebuffer is not complete (INCOMPLETE_ATTACHMENT)")
 
-    monkeypatch.setattr(post, "Fxaa", refuse)
+    monkeypatch.setitem(post._FILTERS, "fxaa", refuse)
     with pytest.raises(InputError, match=r"size 32x24 with post=fxaa: this device .* cannot hold .* smaller size"):
         prepare(make.star(), "raster:post=fxaa", size=(32, 24))
