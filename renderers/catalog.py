@@ -35,6 +35,7 @@ TECHNIQUES: Mapping[str, str] = {
     "raster-passes-64": "raster:passes=64,sampler=jittered",
     "raster-fxaa": "raster:post=fxaa",
     "raster-smaa": "raster:post=smaa",
+    "raster-taa": "raster:post=taa",
 }
 
 MAX_SIDE = 65536

@@ -6,6 +6,7 @@ pass over hundreds of bodies that all move differently is still one upload and o
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import moderngl
 import numpy as np
@@ -50,6 +51,9 @@ class _Batch:
 class SceneBuffers:
     """A scene's bodies on the device, drawn with `draw`; made and used inside the context's `use`."""
 
+    shaders: ClassVar[tuple[str, str]] = ("scene.vert.glsl", "scene.frag.glsl")
+    answers_light: ClassVar[bool] = True
+
     def __init__(
         self,
         context: GraphicsContext,
@@ -65,7 +69,7 @@ class SceneBuffers:
             name: make_shading(gl, scene, name, technique, context.max_texture_size)
             for name in dict.fromkeys(texture_names)
         }
-        self.light = make_light(context, scene, bodies, technique, shadings, size)
+        self.light = make_light(context, scene, bodies, technique, shadings, size) if self.answers_light else None
         vertices, triangles, surfaces = _gather(
             scene, bodies, [shadings[n] for n in texture_names], apart=self.light is not None
         )
@@ -97,8 +101,9 @@ class SceneBuffers:
         self, triangles: NDArray[np.int32], owners: NDArray[np.int32], shading: Shading, gloss: int | None
     ) -> _Batch:
         defined, before = ((), "") if self.light is None else self.light.shader(gloss)
+        vertex, fragment = self.shaders
         program = self._context.program(
-            scene_shader("scene.vert.glsl", shading, defined), scene_shader("scene.frag.glsl", shading, defined, before)
+            scene_shader(vertex, shading, defined), scene_shader(fragment, shading, defined, before)
         )
         index = self._context.gl.buffer(np.ascontiguousarray(triangles).tobytes())
         array = self._make_array(program, self._vertices, index)

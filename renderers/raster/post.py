@@ -17,16 +17,23 @@ from numpy.typing import NDArray
 
 from aliasbench.renderers.raster.filtering import Optics
 from aliasbench.renderers.raster.graphics import GraphicsContext, GraphicsError
-from aliasbench.renderers.raster.stages import Image, ScreenStage
+from aliasbench.renderers.raster.pictures import PostStage, Uploaded
+from aliasbench.renderers.raster.placement import Placement
+from aliasbench.renderers.raster.stages import Image, Jitter
+from aliasbench.renderers.raster.taa import REPLAYED, Taa, halton_place
 from aliasbench.renderers.raster.targets import Target, make_layout
 from aliasbench.renderers.technique import Technique
 from aliasbench.scenes.errors import InputError
+from aliasbench.scenes.model import Scene
 
 
 class Filter(Protocol):
-    """What makes one picture of another."""
+    """What makes one picture of another; its result is in `output`."""
 
-    output: Image
+    @property
+    def output(self) -> Image:
+        """The picture made."""
+        ...
 
     def run(self, scale: float, /) -> None:
         """Do it for the source, whose values count `scale` times."""
@@ -35,49 +42,6 @@ class Filter(Protocol):
     def release(self) -> None:
         """Free what it holds."""
         ...
-
-
-class Uploaded(Image):
-    """A picture that comes from the host."""
-
-    def __init__(self, context: GraphicsContext, size: tuple[int, int], made: ExitStack) -> None:
-        # nothing is drawn to it: devices need not be able to, with three components
-        self.color = context.gl.texture(size, 3, dtype="f4")
-        made.callback(self.color.release)
-
-    def write(self, pixels: NDArray[np.float32]) -> None:
-        """Make it that (h, w, 3) picture."""
-        self.color.write(np.ascontiguousarray(pixels, dtype=np.float32))
-
-    def release(self) -> None:
-        """Free it."""
-        self.color.release()
-
-
-class PostStage(ScreenStage):
-    """A fragment shader over every pixel of a picture, which looks at `source` and at other pictures by name."""
-
-    def __init__(
-        self,
-        context: GraphicsContext,
-        source: Image,
-        size: tuple[int, int],
-        made: ExitStack,
-        shader: str,
-        components: int = 4,
-        **others: Image,
-    ) -> None:
-        super().__init__(context, source, size, made, shader, components=components)
-        self._others = others
-
-    def apply(self, scale: float = 1.0) -> None:
-        """Do it for the source, whose values count `scale` times."""
-        if "scale" in self._program:
-            self._program["scale"] = scale
-        for unit, (name, image) in enumerate(self._others.items(), start=1):
-            image.color.use(unit)
-            self._program[name] = unit
-        self.run((0.0, 0.0))
 
 
 class Fxaa:
@@ -121,19 +85,31 @@ class Smaa:
             step.release()
 
 
-_FILTERS = {"fxaa": Fxaa, "smaa": Smaa}
+_FILTERS: dict[str, type[Fxaa] | type[Smaa]] = {"fxaa": Fxaa, "smaa": Smaa}
 
 
 class Post:
     """The processing that a technique asks for, of pictures of one size."""
 
-    def __init__(self, context: GraphicsContext, technique: Technique, target: Target, size: tuple[int, int]) -> None:
+    def __init__(
+        self,
+        context: GraphicsContext,
+        scene: Scene,
+        placement: Placement,
+        technique: Technique,
+        target: Target,
+        size: tuple[int, int],
+    ) -> None:
         self._uploaded: Uploaded | None = None
         with ExitStack() as made:
             try:
                 if technique.passes > 1:
                     self._uploaded = Uploaded(context, size, made)
-                self._filter: Filter = _FILTERS[technique.post](context, self._uploaded or target.output, size, made)
+                source = self._uploaded or target.output
+                self._taa: Taa | None = None
+                if technique.post == "taa":
+                    self._taa = Taa(context, scene, placement, technique, source, size, made)
+                self._filter: Filter = self._taa or _FILTERS[technique.post](context, source, size, made)
                 context.check("making the pictures to process")
             except (moderngl.Error, GraphicsError) as error:
                 context.gl.clear_errors()
@@ -142,12 +118,33 @@ class Post:
                     f"hold the pictures that takes ({error}); choose a smaller size"
                 ) from None
             made.pop_all()
+        # what the history is of, when it is whole: the first frame and the seed, and the last frame
+        self._history: tuple[int, int] = (0, 0)
+        self._latest: int | None = None
 
-    def run(self, scale: float, pixels: NDArray[np.float32] | None) -> None:
-        """Process what was drawn, times `scale`, or the (h, w, 3) picture given instead."""
-        if self._uploaded is not None and pixels is not None:
+    def frames(self, frame: int, seed: int) -> range:
+        """Return the frames to be drawn and processed, one after the other, for one: those it depends on come first.
+
+        What the last call has left is gone on from where that gives the same picture.
+        """
+        history = (frame if self._taa is None else max(0, frame - REPLAYED), seed)
+        goes_on = history == self._history and self._latest is not None and self._latest < frame
+        first = self._latest + 1 if goes_on and self._latest is not None else history[0]
+        self._history, self._latest = history, None
+        return range(first, frame + 1)
+
+    def place(self, frame: int) -> Jitter:
+        """Return by how much of a pixel, right and down, a frame's picture is to be moved."""
+        return (0.0, 0.0) if self._taa is None else halton_place(frame)
+
+    def run(self, frame: int, scale: float, pixels: NDArray[np.float32]) -> None:
+        """Process what was drawn of a frame, times `scale`; of several passes the (h, w, 3) picture given instead."""
+        if self._uploaded is not None:
             self._uploaded.write(pixels)
+        if self._taa is not None:
+            self._taa.begin(frame, is_first=frame == self._history[0])
         self._filter.run(scale)
+        self._latest = frame
 
     def read_into(self, pixels: NDArray[np.float32]) -> None:
         """Write the processed picture into an (h, w, 3) array."""

@@ -140,8 +140,9 @@ class RasterScene:
             context.release_left_over()
             self._target = Target(context, self._layout, technique, depth_rule(scene.camera), self._optics)
             made.callback(self._target.release)
-            self._post = None if technique.post == "none" else Post(context, technique, self._target, size)
-            if self._post is not None:
+            self._post: Post | None = None
+            if technique.post != "none":
+                self._post = Post(context, scene, self._placement, technique, self._target, size)
                 made.callback(self._post.release)
             self._buffers = SceneBuffers(context, scene, bodies, technique, self._layout.full)
             # compiles the kernels at the first call of a process: that is no rendering
@@ -177,15 +178,23 @@ class RasterScene:
         """
         start = perf_counter()
         t = self._technique
-        exposures = Exposures(t, self._optics, seed, frame)
         pixels = np.empty((self._size[1], self._size[0], 3), np.float32)
-        with self._context.use():
+        with self._context.use() as gl:
             # asked inside, since another thread may close it meanwhile
             if not self._forgotten.alive:
                 raise RuntimeError("this prepared scene is closed; prepare it again to render")
-            for number, part in enumerate(self._parts):
-                done = None if progress is None else _share(progress, number, len(self._parts))
-                self._render_part(part, frame, exposures, pixels, done)
+            frames = range(frame, frame + 1) if self._post is None else self._post.frames(frame, seed)
+            for drawn in frames:
+                if drawn == frame > frames[0]:
+                    # what a running application has drawn before is no part of a frame's price
+                    gl.finish()
+                    start = perf_counter()
+                exposures = Exposures(t, self._optics, seed, drawn)
+                for number, part in enumerate(self._parts, start=(drawn - frames[0]) * len(self._parts)):
+                    done = None if progress is None else _share(progress, number, len(frames) * len(self._parts))
+                    self._render_part(part, drawn, exposures, pixels, done)
+            if self._post is not None:
+                self._post.read_into(pixels)
             self._context.check("drawing a frame")
         samples = self._size[0] * self._size[1] * t.passes * t.msaa * t.ssaa**2
         return Frame(pixels, perf_counter() - start, self._setup_seconds, samples)
@@ -198,7 +207,7 @@ class RasterScene:
         pixels: NDArray[np.float32],
         progress: Progress | None,
     ) -> None:
-        """Draw all passes of a part of the picture and write its pixels."""
+        """Draw all passes of a part of the picture and write its pixels, or leave them with what processes them."""
         whole = len(self._parts) == 1
         drawn = pixels if whole else np.empty((self._layout.part[1], self._layout.part[0], 3), np.float32)
         sums = self._cleared_sums(drawn) if len(exposures) > 1 else None
@@ -226,8 +235,7 @@ class RasterScene:
             np.multiply(sums, 1.0 / weights, out=drawn, casting="same_kind")
         if self._post is not None:
             scale = exposures[0].weight / weights if sums is None else 1.0
-            self._post.run(scale, drawn)
-            self._post.read_into(drawn)
+            self._post.run(frame, scale, drawn)
         elif sums is None and (weights != 1.0 or exposures[0].weight != 1.0):
             np.multiply(drawn, np.float32(exposures[0].weight / weights), out=drawn)
         if not whole:
@@ -242,14 +250,15 @@ class RasterScene:
 
     def _draw_pass(self, part: "_Part", frame: int, exposure: Exposure) -> float:
         """Draw one pass of a part; return the sum of its samples' weights."""
+        ssaa = self._layout.ssaa
+        moved = (0.0, 0.0) if self._post is None else self._post.place(frame)
         instant = Instant(
             frame,
             shutter_fraction(self._scene.animation, exposure.time),
-            exposure.jitter,
+            (exposure.jitter[0] + ssaa * moved[0], exposure.jitter[1] + ssaa * moved[1]),
             exposure.lens,
             self._technique.motion == "matrix",
         )
-        ssaa = self._layout.ssaa
         drawn = (self._size[0] * ssaa, self._size[1] * ssaa)
         matrices = clip_matrices(self._scene, self._placement, instant, size=drawn, window=part.window)
         if self._buffers.light is not None:

@@ -6,7 +6,7 @@ import numpy as np
 
 from aliasbench.renderers.catalog import render
 from aliasbench.renderers.raster.context import acquire_context
-from aliasbench.renderers.raster.post import Uploaded
+from aliasbench.renderers.raster.pictures import Uploaded
 from aliasbench.scenes.model import Scene
 
 # Of the square: what keeps it in its place, as functions of (h, w, 3) pictures that undo themselves.
