@@ -117,8 +117,14 @@ class MotionBuffers(SceneBuffers):
 
 
 def _some(pieces: Pieces, chosen: BoolArray) -> Pieces:
-    rows = (pieces.corners, pieces.uv, pieces.nearest, pieces.surfaces, pieces.triangles)
-    return Pieces(*(row[chosen] for row in rows), pieces.matrix)
+    return replace(
+        pieces,
+        corners=pieces.corners[chosen],
+        uv=pieces.uv[chosen],
+        nearest=pieces.nearest[chosen],
+        surfaces=pieces.surfaces[chosen],
+        triangles=pieces.triangles[chosen],
+    )
 
 
 def _stands(now: FloatArray, before: FloatArray) -> BoolArray:
