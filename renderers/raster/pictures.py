@@ -48,7 +48,7 @@ class PostStage(ScreenStage):
     ) -> None:
         super().__init__(context, source, size, made, shader, components=components)
         self.others = others
-        self.settings: dict[str, bool] = {}
+        self.settings: dict[str, bool | int] = {}
 
     def apply(self, scale: float = 1.0) -> None:
         """Do it for the source, whose values count `scale` times."""

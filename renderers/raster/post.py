@@ -27,6 +27,10 @@ from aliasbench.scenes.errors import InputError
 from aliasbench.scenes.model import Scene
 
 
+# in fxaa.frag.glsl: at how many distances ends of edges are looked for
+_STOPS = 11
+
+
 class Filter(Protocol):
     """What makes one picture of another; its result is in `output`."""
 
@@ -50,6 +54,7 @@ class Fxaa:
     def __init__(self, context: GraphicsContext, source: Image, size: tuple[int, int], made: ExitStack) -> None:
         self._luma = PostStage(context, source, size, made, "luma.frag.glsl", 1)
         self._blend = PostStage(context, source, size, made, "fxaa.frag.glsl", lumas=self._luma.output)
+        self._blend.settings["stops"] = _STOPS
         self.output = self._blend.output
 
     def run(self, scale: float, /) -> None:

@@ -23,17 +23,24 @@ float edge(ivec2 at, int channel) {
 // The end of the edge in direction `along` or against it: how many more pixels it has, and the turns at its end to the
 // other side and to this one (0 none, 1 a turn, CORNER a corner).
 vec3 find_end(ivec2 at, ivec2 along, int towards, ivec2 across, int channel) {
-    for (int k = 0; k < FARTHEST; ++k) {
-        ivec2 here = at + towards * k * along;
-        ivec2 border = towards > 0 ? here + along : here;
-        float that = edge(border - across, 1 - channel), this_ = edge(border, 1 - channel);
-        if (that + this_ > 0.0 || edge(here + towards * along, channel) == 0.0) {
-            that *= edge(border - 2 * across, 1 - channel) > 0.0 ? CORNER : 1.0;
-            this_ *= edge(border + across, 1 - channel) > 0.0 ? CORNER : 1.0;
-            return vec3(k, that, this_);
+    int k = 0;
+    vec2 turns = vec2(0.0);
+    ivec2 border = towards > 0 ? at + along : at;
+    while (k < FARTHEST) {
+        turns = vec2(edge(border - across, 1 - channel), edge(border, 1 - channel));
+        at += towards * along;
+        if (turns.x + turns.y > 0.0 || edge(at, channel) == 0.0) {
+            break;
         }
+        border += towards * along;
+        ++k;
     }
-    return vec3(FARTHEST, 0.0, 0.0);
+    if (k == FARTHEST) {
+        return vec3(k, 0.0, 0.0);
+    }
+    turns.x *= edge(border - 2 * across, 1 - channel) > 0.0 ? CORNER : 1.0;
+    turns.y *= edge(border + across, 1 - channel) > 0.0 ? CORNER : 1.0;
+    return vec3(k, turns);
 }
 
 // The integral of 1 - 2 x / size over the pixel at `distance` from the end, as far as it is positive.
