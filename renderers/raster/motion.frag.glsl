@@ -6,8 +6,8 @@ in vec4 place_before;
 in vec2 coordinate;
 flat in float surface;
 
-layout(location = 0) out vec4 motion;       // right, down, depth before, depth now
-layout(location = 1) out float surface_seen;
+layout(location = 0) out vec4 motion;       // right, down, depth before
+layout(location = 1) out vec2 seen;         // surface, depth
 
 const float NOWHERE = 1e9;                  // behind the camera
 
@@ -30,6 +30,6 @@ void main() {
         moved = half_size * (place_before.xy / place_before.w - place_now.xy / place_now.w);
         depth = place_before.z / place_before.w;
     }
-    motion = vec4(moved, depth, gl_FragCoord.z);
-    surface_seen = surface;
+    motion = vec4(moved, depth, 1.0);
+    seen = vec2(surface, gl_FragCoord.z);
 }

@@ -35,7 +35,7 @@ class MotionTarget:
     def __init__(self, context: GraphicsContext, size: tuple[int, int], rule: DepthRule, made: ExitStack) -> None:
         gl = context.gl
         self._rule = rule
-        self.motions, self.surfaces = Image(context, size, made), Image(context, size, made, components=1)
+        self.motions, self.surfaces = Image(context, size, made), Image(context, size, made, components=2)
         self._depth = gl.depth_renderbuffer(size)
         made.callback(self._depth.release)
         context.store(self._depth, size, 1, DEPTH32F)

@@ -1,6 +1,8 @@
 """Pictures that are processed after they are finished, and the steps that make one of several."""
 
+from collections.abc import Mapping
 from contextlib import ExitStack
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,9 +46,10 @@ class PostStage(ScreenStage):
         made: ExitStack,
         shader: str,
         components: int = 4,
+        constants: Mapping[str, int] = MappingProxyType({}),
         **others: Image,
     ) -> None:
-        super().__init__(context, source, size, made, shader, components=components)
+        super().__init__(context, source, size, made, shader, components=components, **constants)
         self.others = others
         self.settings: dict[str, bool | int] = {}
 

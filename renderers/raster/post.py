@@ -26,7 +26,6 @@ from aliasbench.renderers.technique import Technique
 from aliasbench.scenes.errors import InputError
 from aliasbench.scenes.model import Scene
 
-
 # in fxaa.frag.glsl: at how many distances ends of edges are looked for
 _STOPS = 11
 
@@ -34,10 +33,7 @@ _STOPS = 11
 class Filter(Protocol):
     """What makes one picture of another; its result is in `output`."""
 
-    @property
-    def output(self) -> Image:
-        """The picture made."""
-        ...
+    output: Image
 
     def run(self, scale: float, /) -> None:
         """Do it for the source, whose values count `scale` times."""

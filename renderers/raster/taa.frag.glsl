@@ -7,15 +7,16 @@
 // hidden before, or outside the picture, has no history.
 uniform sampler2D source;
 uniform sampler2D history;
-uniform sampler2D motions;          // right, down, depth before, depth now
-uniform sampler2D surfaces;         // see motion.vert.glsl; 0 where nothing is
-uniform sampler2D motions_before;
-uniform sampler2D surfaces_before;
 uniform float scale;
+#if STILL                           // the whole scene, or there is no history
 uniform bool is_first;
-uniform bool is_still;              // the whole scene
+#else
+uniform sampler2D motions;          // right, down, depth before
+uniform sampler2D surfaces;         // see motion.vert.glsl, 0 where nothing is; depth
+uniform sampler2D surfaces_before;
 uniform bool by_surface;            // whether what does not move itself is still when other things move
 uniform bool larger_is_nearer;      // of depths
+#endif
 
 out vec4 radiance;
 
@@ -41,14 +42,21 @@ vec3 color(ivec2 at) {
     return scale * texelFetch(source, inside(at), 0).rgb;
 }
 
+// The mean with what was seen here before.
+vec4 add_still(vec3 now, vec4 before) {
+    float count = min(before.a, MOST_STILL);
+    return vec4(before.rgb + (now - before.rgb) / (count + 1.0), count + 1.0);
+}
+
+#if !STILL
 bool nearer(float a, float b) {
     return larger_is_nearer ? a > b : a < b;
 }
 
 // Whether everything around a pixel is where it was, now and in the frame before.
 bool still_around(ivec2 at) {
-    if (is_still || !by_surface) {
-        return is_still;
+    if (!by_surface) {
+        return false;
     }
     for (int k = 0; k < 9; ++k) {
         ivec2 here = inside(at + AROUND[k]);
@@ -64,10 +72,10 @@ bool seen_before(ivec2 at, float surface, float depth) {
     float least = 3e38, most = -3e38;
     for (int k = 0; k < SEARCHED; ++k) {
         ivec2 here = inside(at + (k < 9 ? AROUND[k] : 2 * AROUND[k - 8]));
-        if (abs(texelFetch(surfaces_before, here, 0).r) == abs(surface)) {
-            float found = texelFetch(motions_before, here, 0).w;
-            least = min(least, found);
-            most = max(most, found);
+        vec2 found = texelFetch(surfaces_before, here, 0).rg;
+        if (abs(found.r) == abs(surface)) {
+            least = min(least, found.g);
+            most = max(most, found.g);
         }
     }
     float off = DEPTH_TOLERANCE * abs(depth);
@@ -92,37 +100,37 @@ vec3 fetch_history(vec2 place) {
     return sum;
 }
 
+#endif
+
 void main() {
     ivec2 at = ivec2(gl_FragCoord.xy);
     last = textureSize(source, 0) - 1;
     vec3 now = color(at);
+#if STILL
+    radiance = is_first ? vec4(now, 1.0) : add_still(now, texelFetch(history, at, 0));
+#else
     radiance = vec4(now, 1.0);
-    if (is_first) {
-        return;
-    }
     if (still_around(at)) {
-        vec4 before = texelFetch(history, at, 0);
-        float count = min(before.a, MOST_STILL);
-        radiance = vec4(before.rgb + (now - before.rgb) / (count + 1.0), count + 1.0);
+        radiance = add_still(now, texelFetch(history, at, 0));
         return;
     }
     vec3 mean = vec3(0.0), squares = vec3(0.0);
-    vec4 motion = vec4(0.0);
-    float surface = 0.0;
+    float surface = 0.0, depth = 0.0;
+    ivec2 followed = at;
     for (int k = 0; k < 9; ++k) {
-        ivec2 here = at + AROUND[k];
+        ivec2 here = inside(at + AROUND[k]);
         vec3 value = TO_YCOCG * (color(here) - now);
         mean += value / 9.0;
         squares += value * value / 9.0;
-        float found = texelFetch(surfaces, inside(here), 0).r;
-        if (found != 0.0) {
-            vec4 moved = texelFetch(motions, inside(here), 0);
-            if (surface == 0.0 || (found != surface && nearer(moved.w, motion.w))) {
-                motion = moved;
-                surface = found;
-            }
+        vec2 found = texelFetch(surfaces, here, 0).rg;
+        if (found.r != 0.0 && (surface == 0.0 || (found.r != surface && nearer(found.g, depth)))) {
+            surface = found.r;
+            depth = found.g;
+            followed = here;
         }
     }
+    // all 0 where nothing is
+    vec4 motion = texelFetch(motions, followed, 0);
     vec2 place = vec2(at) + 0.5 + motion.xy;
     if (any(lessThan(place, vec2(0.0))) || any(greaterThan(place, vec2(last + 1)))) {
         return;
@@ -140,4 +148,5 @@ void main() {
     vec3 likely = TO_RGB * (mean + (most > 1.0 ? off / most : off));
     float count = min(texelFetch(history, pixel, 0).a, MOST_MOVING);
     radiance = vec4(now + likely * (count / (count + 1.0)), count + 1.0);
+#endif
 }

@@ -55,13 +55,13 @@ class Taa:
         # what does not move may change all the same where it reflects others, or they their shadows on it
         self._by_surface = not scene.lights and all(s.material.kind in ("unlit", "diffuse") for s in scene.objects)
         self._larger_is_nearer = rule.comparison == ">="
-        self._steps = [PostStage(context, source, size, made, "taa.frag.glsl") for _ in range(2)]
+        # two of each kind, so that there always is one that does not write what it reads
+        self._still, self._moving = (
+            [PostStage(context, source, size, made, "taa.frag.glsl", constants={"STILL": still}) for _ in range(2)]
+            for still in (1, 0)
+        )
         self._is_first = self._is_still = False
-
-    @property
-    def output(self) -> Image:
-        """The mean up to the last frame that was run."""
-        return self._steps[0].output
+        self.output = self._still[0].output
 
     def begin(self, frame: int, is_first: bool) -> None:
         """Draw the motion up to the frame that is run next; the first one has no history."""
@@ -69,27 +69,21 @@ class Taa:
         self._is_still = self._motion.draw(frame, halton_place(frame))
 
     def run(self, scale: float, /) -> None:
-        """Add a frame's picture, times `scale`."""
-        self._steps.reverse()
-        step, history = self._steps
-        now, before = self._motion.now, self._motion.before
-        step.others = {
-            "history": history.output,
-            "motions": now.motions,
-            "surfaces": now.surfaces,
-            "motions_before": before.motions,
-            "surfaces_before": before.surfaces,
-        }
-        step.settings = {
-            "is_first": self._is_first,
-            "is_still": self._is_still,
-            "by_surface": self._by_surface,
-            "larger_is_nearer": self._larger_is_nearer,
-        }
+        """Add a frame's picture, times `scale`, to `output`, the mean up to the one before."""
+        simple = self._is_first or self._is_still
+        step = next(s for s in (self._still if simple else self._moving) if s.output is not self.output)
+        step.others = {"history": self.output}
+        if simple:
+            step.settings = {"is_first": self._is_first}
+        else:
+            now, before = self._motion.now, self._motion.before
+            step.others |= {"motions": now.motions, "surfaces": now.surfaces, "surfaces_before": before.surfaces}
+            step.settings = {"by_surface": self._by_surface, "larger_is_nearer": self._larger_is_nearer}
         step.apply(scale)
+        self.output = step.output
 
     def release(self) -> None:
         """Free everything."""
-        for step in self._steps:
+        for step in (*self._still, *self._moving):
             step.release()
         self._motion.release()

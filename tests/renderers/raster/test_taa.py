@@ -180,9 +180,9 @@ def test_motion_is_where_it_was_a_frame_before(make, half):
         assert far.tolist() == [half > 1e6, False]
         with inner._context.use():
             seen = motion.now.motions.framebuffer.read(components=4, dtype="f4")
-            surfaces = motion.now.surfaces.framebuffer.read(components=1, dtype="f4")
+            surfaces = motion.now.surfaces.framebuffer.read(components=2, dtype="f4")
     seen = np.frombuffer(seen, np.float32).reshape(40, 48, 4)
-    surfaces = np.frombuffer(surfaces, np.float32).reshape(40, 48)
+    surfaces = np.frombuffer(surfaces, np.float32).reshape(40, 48, 2)[..., 0]
     now, before = (view_at(camera, scene.animation, f, 0.0, size) for f in (frame, frame - 1))
     place = np.stack(np.meshgrid(np.arange(48) + 0.5, np.arange(40) + 0.5), -1) + halton_place(frame)
     x, y = (place[..., 0] - 24) / now.scale, (place[..., 1] - 20) / now.scale
