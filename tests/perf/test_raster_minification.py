@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from aliasbench.renderers.catalog import prepare, render
-from aliasbench.renderers.raster import pipeline
+from aliasbench.renderers.raster import shaders
 from aliasbench.scenes.catalog import SCENES
 
 MODES = ("point", "linear", "mipmap", "trilinear", *(f"anisotropic,anisotropy={n}" for n in (2, 4, 8, 16, 64)))
@@ -22,10 +22,10 @@ DEVICE = "device's anisotropy 16"
 
 def prepare_device_anisotropy(scene: Any, size: tuple[int, int], monkeypatch: pytest.MonkeyPatch) -> Any:
     """Return the scene with the driver's look-up, which takes its own derivatives, in place of ours."""
-    real = pipeline.read_shader
+    real = shaders.read_shader
     with monkeypatch.context() as patch:
         patch.setattr(
-            pipeline,
+            shaders,
             "read_shader",
             lambda name: real(name).replace("textureLod(image, coordinate, lod)", "texture(image, coordinate)"),
         )

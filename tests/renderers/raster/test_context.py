@@ -17,7 +17,9 @@ from aliasbench.renderers.raster.context import (
 )
 from aliasbench.renderers.raster.graphics import GraphicsError
 from aliasbench.renderers.raster.platforms import ContextError
-from aliasbench.scenes.errors import InputError
+from aliasbench.scenes.catalog import SCENES
+from aliasbench.scenes.errors import InputError, UnsupportedScene
+from aliasbench.scenes.files import load_scene
 
 
 def test_every_backend_is_reported_with_what_it_can_do_or_how_to_get_it():
@@ -51,6 +53,32 @@ def test_egl_and_osmesa_draw_the_same_picture(make):
     else:
         with pytest.raises(NoContextError, match=r"OSMesa: .*libosmesa6"):
             render(scene, "raster:backend=osmesa", size=(64, 48))
+
+
+def supported_scenes():
+    """Names of the catalog's scenes that the rasterizer draws."""
+    return [name for name in SCENES if name not in ("colour-bleeding", "dispersion-prism")]
+
+
+def test_the_rasterizer_draws_all_scenes_but_two():
+    for name in ("colour-bleeding", "dispersion-prism"):
+        with pytest.raises(UnsupportedScene):
+            prepare(load_scene(name), "raster", size=(8, 8))
+    assert len(supported_scenes()) == len(SCENES) - 2
+
+
+@pytest.mark.parametrize("name", supported_scenes())
+def test_egl_and_osmesa_draw_every_scene_alike(name):
+    """On the same Mesa: largest difference 1e-6. Without OSMesa the sentence that says what is missing is shown."""
+    osmesa = next(r for r in describe_contexts() if r.backend == "osmesa")
+    scene, size = load_scene(name), (24, 18)
+    if not osmesa.ok:
+        with pytest.raises(NoContextError, match=r"OSMesa: .*libosmesa6"):
+            render(scene, "raster:backend=osmesa", size=size)
+        return
+    for technique in ("raster:texture=trilinear,", "raster:msaa=4,passes=2,filter=tent,"):
+        one, other = (render(scene, f"{technique}backend={b}", size=size).pixels for b in ("egl", "osmesa"))
+        np.testing.assert_allclose(one, other, atol=1e-6)
 
 
 def test_one_context_for_each_thread_and_backend():
