@@ -9,6 +9,7 @@ run: setup
 
 test:
 	@sh .ci/setup.sh browser
+	$(BIN)/python tests/compile_kernels.py
 	$(BIN)/python -m pytest -n auto --dist loadfile
 
 setup:
