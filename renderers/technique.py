@@ -203,6 +203,8 @@ def parse_technique(text: str) -> Technique:
     renderer: RendererName = name
     given: dict[str, str] = {}
     for part in (p.strip() for p in tail.split(",") if tail.strip()):
+        if not part:
+            raise InputError(f"technique {text!r}: there is nothing between two commas or after the last; leave it out")
         key, equals, value = (s.strip() for s in part.partition("="))
         known = [k for k, row in KEYS.items() if renderer in row.renderers]
         if key not in known:

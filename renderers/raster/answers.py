@@ -73,6 +73,11 @@ class Light:
                 self.text,
             )
 
+    @property
+    def most_rays(self) -> int | None:
+        """How many shadow rays a pass may have at a time; None without lights."""
+        return None if self._lighting is None else self._lighting.most_rays
+
     def shader(self, gloss: int | None) -> tuple[tuple[str, ...], str]:
         """Return what is defined and what comes before the fragment shader of an object, which is glossy where it has a
         number."""

@@ -63,9 +63,20 @@ class Exposure:
 
 
 class Exposures:
-    """All passes of one frame."""
+    """All passes of one frame.
 
-    def __init__(self, technique: Technique, optics: Optics, seed: int, frame: int) -> None:
+    Of many shadow rays at most `most_rays` are drawn at a time: such passes are drawn several times, with some of their
+    points on the lights each, and count for the share of these.
+
+    Attributes
+    ----------
+    passes : int
+        Of the technique.
+    """
+
+    def __init__(
+        self, technique: Technique, optics: Optics, seed: int, frame: int, most_rays: int | None = None
+    ) -> None:
         t = technique
         number = pattern_frame(t.reseed, frame)
         points = sample_set(t.sampler, t.passes, seed=seed, frame=number)
@@ -78,24 +89,26 @@ class Exposures:
             dx, dy, signs = warp_points(optics.warp, x, y)
             self._places, self._weights = np.stack([dx, dy], axis=1), optics.warp.gain * signs
         self._times = np.full(t.passes, 0.5) if t.time == "center" else points[:, DIM_TIME]
-        self._shadow_rays = t.shadow_rays
+        self.passes, self._groups = t.passes, -(-t.shadow_rays // (most_rays or t.shadow_rays))
         self._lights = points[:, None, DIM_LIGHT : DIM_LIGHT + 2]
         if t.shadow_rays > 1:
             lights = light_points(t.sampler, t.passes * t.shadow_rays, seed, number)
             self._lights = lights.reshape(t.passes, t.shadow_rays, 2)
 
     def __len__(self) -> int:
-        return len(self._places)
+        return self.passes * self._groups
 
-    def __getitem__(self, k: int) -> Exposure:
+    def __getitem__(self, number: int) -> Exposure:
+        k, group = divmod(number, self._groups)
+        lights = self._lights[k, group :: self._groups]
         u, v = self._points[k, DIM_LENS], self._points[k, DIM_LENS + 1]
         return Exposure(
             (float(self._places[k, 0]), float(self._places[k, 1])),
             float(self._times[k]),
             disc_point(u, v),
-            self._lights[k],
+            lights,
             (float(self._points[k, DIM_DIRECTION]), float(self._points[k, DIM_DIRECTION + 1])),
-            float(self._weights[k]),
+            float(self._weights[k]) * len(lights) / self._lights.shape[1],
         )
 
 

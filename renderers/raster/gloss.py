@@ -13,6 +13,7 @@ Against the ray tracer on `glossy-floor` at 120 x 90, means of 6 times 1024 samp
 """
 
 from contextlib import ExitStack
+from dataclasses import replace
 
 import moderngl
 import numpy as np
@@ -229,6 +230,8 @@ class Gloss:
         marked = (*defined, "MIRRORED")
         before = read_shader("gloss.glsl") + text
         used = dict.fromkeys(o.texture for o in scene.objects)
+        # what is mirrored is a picture of one sample a pixel: its holes are cut
+        shadings = {name: replace(shading, is_coverage=False) for name, shading in shadings.items()}
         self._programs = {
             name: (
                 context.program(

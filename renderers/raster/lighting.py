@@ -42,6 +42,10 @@ from aliasbench.scenes.model import FloatArray, ImageTexture, Scene
 from aliasbench.scenes.projection import View, view_at
 
 MOST_EXACT = 256  # triangles
+# Of all loops of a fragment: drivers may end them after 65535, and say nothing.
+_MOST_TURNS = 1 << 15
+# As many as have maps of full size, five sides each.
+_MOST_MAPPED_RAYS = 3
 _MOST_CUTOUTS = 8  # textures: OpenGL 3.3 grants a shader 16
 _HEADER = 3  # texels of a light point before its occluders: place, what it brings, normal
 _MAP_SLOT, _FIRST_SLOT = 7, 8  # texture units: of shadow maps, and of cut-out textures from there on
@@ -78,6 +82,8 @@ class Lighting:
     ----------
     text : str
         The shader's functions.
+    most_rays : int
+        How many shadow rays a pass may have at a time.
     """
 
     def __init__(
@@ -94,12 +100,15 @@ class Lighting:
         holed = np.array([o.texture in cut for o in scene.objects], dtype=bool)[surfaces.owners]
         of_texture = [np.array([o.texture == name for o in scene.objects])[surfaces.owners] for name in cut]
         self._maps: ShadowMaps | None = None
+        # every triangle is a turn of a loop, and every group of them
+        self.most_rays = max(1, _MOST_TURNS // (2 * len(surfaces.owners) + 2))
         if len(surfaces.owners) > MOST_EXACT:
             uv = np.zeros_like(surfaces.uv)
             for name, mine in zip(cut, of_texture, strict=True):
                 uv[mine] = _coordinates(surfaces, shadings[name], np.flatnonzero(mine))
             holes = [(shadings[name], mine) for name, mine in zip(cut, of_texture, strict=True)]
-            self._maps = ShadowMaps(context, uv, holes, technique.shadow_rays)
+            self.most_rays = _MOST_MAPPED_RAYS
+            self._maps = ShadowMaps(context, uv, holes, min(technique.shadow_rays, self.most_rays))
             cut, of_texture, holed = [], [], np.ones_like(holed)
         self._solid = np.flatnonzero(~holed)
         self._cut = [np.flatnonzero(mine) for mine in of_texture]
@@ -111,7 +120,8 @@ class Lighting:
         first = _HEADER + self._groups * (1 + 3 * GROUP)
         self._first_cut = first
         width = first + 4 * sum(len(c) for c in self._cut) + (FACES * FACE_TEXELS if self._maps else 0)
-        self._points = context.gl.texture((width, technique.shadow_rays), 4, dtype="f4")
+        self._points = context.gl.texture((width, min(technique.shadow_rays, self.most_rays)), 4, dtype="f4")
+        self._count = 0
         self._points.filter = (context.gl.NEAREST, context.gl.NEAREST)
         self.text = self._make_text(cut, shadings)
 
@@ -150,7 +160,9 @@ class Lighting:
         if self._version != surfaces.version:
             self._version = surfaces.version
             self._solid = self._solid[neighbours_order(surfaces.corners[self._solid])]
-        rows = np.zeros((self._points.height, self._points.width, 4), np.float32)
+        self._count = len(exposure.lights)
+        room = np.zeros((self._points.height, self._points.width, 4), np.float32)
+        rows = room[: self._count]
         rows[:, 0, :3], rows[:, 1, :3], rows[:, 2, :3] = points.places, points.brought, points.normals
         if self._lit.any():
             lit = box_corners(surfaces.corners[self._lit])
@@ -159,7 +171,7 @@ class Lighting:
             else:
                 self._write_solid(points, lit, rows)
                 self._write_cutouts(points, lit, rows)
-        self._points.write(rows.tobytes())
+        self._points.write(room.tobytes())
 
     def _write_solid(self, points: LightPoints, lit: FloatArray, rows: np.ndarray) -> None:
         corners = self._surfaces.corners[self._solid]
@@ -196,7 +208,7 @@ class Lighting:
     def use(self) -> dict[str, int]:
         """Bind what shaders read; return the uniforms that say where it is."""
         self._points.use(self._slot)
-        uniforms = {"lights": self._slot, "light_points": self._points.height}
+        uniforms = {"lights": self._slot, "light_points": self._count}
         if self._maps is not None:
             self._maps.use(_MAP_SLOT)
             uniforms["shadow_map"] = _MAP_SLOT

@@ -29,6 +29,7 @@ from aliasbench.renderers.technique import Technique
 from aliasbench.scenes.errors import InputError
 from aliasbench.scenes.model import FloatArray, Scene
 
+_MOST_REPEATS = 2.0**21  # from the middle of a surface: float32 is a quarter apart there
 BODIES_PER_ROW = 1024  # as in scene.vert.glsl
 _VERTEX = np.dtype([("position", "3f4"), ("texcoord", "2f4"), ("color", "3f4"), ("body", "i4"), ("triangle", "i4")])
 
@@ -77,6 +78,7 @@ class SceneBuffers:
         self._batches: list[_Batch] = []
         self._colors = np.array([s.color for s in scene.objects]).reshape(-1, 3)
         self._left_out = np.zeros(len(scene.objects), dtype=bool)
+        self._is_coarse = _coarse_objects(vertices, triangles, surfaces, [shadings[n] for n in texture_names])
         glossy = [k if s.material.kind == "glossy" else None for k, s in enumerate(scene.objects)]
         kinds = list(zip(texture_names, glossy, strict=True))
         for name, gloss in dict.fromkeys(kinds):
@@ -123,6 +125,12 @@ class SceneBuffers:
         """Draw into the bound target every body with its matrix (n, 4, 4), the far objects as pieces instead."""
         if not self._batches:
             return
+        coarse = self._is_coarse if far is None else self._is_coarse & ~far
+        if coarse.any():
+            raise InputError(
+                f"object {int(np.argmax(coarse))}: its texture repeats so often that the rasterizer's 32-bit "
+                f"coordinates cannot tell one from the next (over {_MOST_REPEATS:.0e} times); divide the surface"
+            )
         self._leave_out(far)
         if pieces is not None:
             matrices = np.concatenate([matrices, pieces.matrix[None]])
@@ -217,3 +225,18 @@ def _gather(
         joined = np.arange(len(vertices), dtype=np.int32).reshape(-1, 3)
         vertices["triangle"] = np.arange(len(joined), dtype=np.int32).repeat(3)
     return vertices, joined, owner
+
+
+def _coarse_objects(
+    vertices: NDArray[np.void],
+    triangles: NDArray[np.int32],
+    surfaces: NDArray[np.int32],
+    shadings: Sequence[Shading],
+) -> BoolArray:
+    """Return which objects have texture coordinates that float32 does not resolve."""
+    out = np.zeros(len(shadings), dtype=bool)
+    if len(triangles):
+        largest = np.abs(vertices["texcoord"]).max(axis=1)[triangles].max(axis=1)
+        beyond = np.unique(surfaces[largest > _MOST_REPEATS])
+        out[beyond] = [shadings[k].periodic and shadings[k].kind != "PLAIN" for k in beyond]
+    return out

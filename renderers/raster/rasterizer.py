@@ -146,6 +146,7 @@ class RasterScene:
                 made.callback(self._post.release)
             self._buffers = SceneBuffers(context, scene, bodies, technique, self._layout.full)
             # compiles the kernels at the first call of a process: that is no rendering
+            self._most_rays = None if self._buffers.light is None else self._buffers.light.most_rays
             first = Exposures(technique, self._optics, 0, 0)
             # one sample in the middle of everything is the same in every frame
             is_fixed = technique.sampler == "center" and technique.passes * technique.shadow_rays == 1
@@ -192,7 +193,7 @@ class RasterScene:
                     # what a running application has drawn before is no part of a frame's price
                     gl.finish()
                     start = perf_counter()
-                exposures = self._fixed or Exposures(t, self._optics, seed, drawn)
+                exposures = self._fixed or Exposures(t, self._optics, seed, drawn, self._most_rays)
                 for number, part in enumerate(self._parts, start=(drawn - frames[0]) * len(self._parts)):
                     done = None if progress is None else _share(progress, number, len(frames) * len(self._parts))
                     self._render_part(part, drawn, exposures, pixels, done)
@@ -228,8 +229,8 @@ class RasterScene:
             if progress is not None:
                 progress((number + 1) / len(exposures))
         if self._optics.warp.code != IDENTITY:
-            weights = float(len(exposures))  # signed samples of a distribution: their mean, not their quotient
-        if not abs(weights) > _LEAST_WEIGHT * len(exposures):
+            weights = float(exposures.passes)  # signed samples of a distribution: their mean, not their quotient
+        if not abs(weights) > _LEAST_WEIGHT * exposures.passes:
             raise InputError(
                 f"filter={self._technique.filter},radius={self._technique.radius_px:g}: no sample lies under so narrow "
                 "a filter; use passes alone, whose places are drawn under it"

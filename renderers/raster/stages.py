@@ -19,9 +19,12 @@ from numpy.typing import NDArray
 
 from aliasbench.renderers.raster.filtering import Optics, plane_weights, profile_weights
 from aliasbench.renderers.raster.graphics import GraphicsContext, read_shader
+from aliasbench.scenes.errors import InputError
 from aliasbench.scenes.model import FloatArray
 
 _TAPS_PER_ROW = 1024  # as in taps.frag.glsl
+_TAPS_AT_ONCE = 1 << 14
+_MOST_TAPS = 1 << 22
 
 Jitter = tuple[float, float]
 
@@ -103,12 +106,16 @@ class ScreenStage:
 
     def run(self, _jitter: Jitter, /) -> float:
         """See `Stage`."""
+        self._begin()
+        self._screen.render(moderngl.TRIANGLES, vertices=3)
+        return 1.0
+
+    def _begin(self) -> None:
+        """Make the output the target and the source what is read."""
         self.output.framebuffer.use()
         self.output.framebuffer.ctx.enable_only(moderngl.NOTHING)
         self._source.color.use(0)
         self._program["source"] = 0
-        self._screen.render(moderngl.TRIANGLES, vertices=3)
-        return 1.0
 
     def release(self) -> None:
         """See `Stage`."""
@@ -198,10 +205,16 @@ class Taps(ScreenStage):
         margin: int,
         made: ExitStack,
     ) -> None:
+        most = samples * (2 * margin + ssaa) ** 2
+        if most > _MOST_TAPS:
+            raise InputError(
+                f"filter={optics.spec.name},radius={optics.spec.radius:g}: {most} samples a pixel would have to be "
+                f"weighted in each pass; up to {_MOST_TAPS} can be. Use a smaller radius, or passes in place of "
+                "msaa and ssaa"
+            )
         super().__init__(context, source, size, made, "taps.frag.glsl", SAMPLES=samples, SSAA=ssaa)
         self._positions = context.sample_positions(samples) - 0.5
         self._optics, self._ssaa, self._margin = optics, ssaa, margin
-        most = samples * (2 * margin + ssaa) ** 2
         self._taps = context.gl.texture((_TAPS_PER_ROW, -(-most // _TAPS_PER_ROW)), 4, dtype="f4")
         self._room = np.zeros((self._taps.height * _TAPS_PER_ROW, 4), np.float32)
         made.callback(self._taps.release)
@@ -212,8 +225,15 @@ class Taps(ScreenStage):
         self._room[: len(taps)] = taps
         self._taps.write(self._room)
         self._taps.use(1)
-        self._program["taps"], self._program["count"], self._program["margin"] = 1, len(taps), self._margin
-        super().run(jitter)
+        self._begin()
+        self._program["taps"], self._program["margin"] = 1, self._margin
+        gl = self.output.framebuffer.ctx
+        for first in range(0, len(taps), _TAPS_AT_ONCE):
+            self._program["first"], self._program["after"] = first, min(first + _TAPS_AT_ONCE, len(taps))
+            self._screen.render(moderngl.TRIANGLES, vertices=3)
+            gl.enable_only(moderngl.BLEND)
+            gl.blend_func = moderngl.ONE, moderngl.ONE
+        gl.enable_only(moderngl.NOTHING)
         return float(self._room[: len(taps), 3].sum(dtype=np.float64))
 
     def release(self) -> None:

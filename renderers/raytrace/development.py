@@ -50,6 +50,7 @@ _PILOT = 0x9110  # what the key of a discarded pilot is derived with
 # Under a filter with lobes few samples can have weights that nearly cancel, and a quotient of them is anything; see
 # `_resolve`. Of single samples of a pixel 7 % do (lanczos), of four 0.1 %, of sixteen none.
 _LEAST_WEIGHT = 0.25
+_NO_WEIGHT = 1e-6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -266,6 +267,9 @@ class Development:
                 strong = sums[..., 3:] > _LEAST_WEIGHT * expected * reach
                 means = np.divide(sums[..., :3], sums[..., 3:], out=np.zeros_like(out), where=strong)
                 out += np.where(weak, (1.0 - weights / expected) * means, 0.0)
+                # one pattern for all pixels may be weak everywhere: then there is but the quotient
+                lone = weak & ~strong & (np.abs(weights) > _NO_WEIGHT)
+                out = np.where(lone, window[..., :3] / np.where(lone, weights, 1.0), out)
             return out
         return np.divide(window[..., :3], weights, out=np.zeros_like(window[..., :3]), where=weights > 0.0)
 

@@ -23,9 +23,11 @@ from aliasbench.renderers.raytrace.kernels import (
 from aliasbench.renderers.raytrace.lanes import (
     HIT_PRIM,
     LANES,
+    PERSPECTIVE,
     RAY_ID,
     RAY_MASK,
     RAY_SIZE,
+    RAY_TNEAR,
     SCRATCH_SIZE,
     aligned_floats,
 )
@@ -42,6 +44,7 @@ Kernel = Callable[..., None]
 
 _COHERENT = 1 << 16
 _ALL_FEATURES = -1
+_AHEAD = 1e-30
 _REPORTS_S = 0.1  # between two reports of progress
 
 
@@ -186,6 +189,11 @@ class PacketEngine:
         each = 2 if isinstance(arguments[0], Scattering) else 1
         threads = max(1, min(self._threads, rows))
         workspaces = [[make_workspace(width, pattern, margin) for _ in range(each)] for _ in range(threads)]
+        if camera[PERSPECTIVE] == 1.0:
+            # in a polygon's plane a camera sees nothing of it
+            for own in workspaces:
+                for w in own:
+                    w.ray[RAY_TNEAR : RAY_TNEAR + LANES] = w.body_ray[RAY_TNEAR : RAY_TNEAR + LANES] = _AHEAD
         if len(tables.triangles) and (tables.objects[:, CUTOFF] > -np.inf).any():
             from aliasbench.renderers.raytrace.cutout_filter import set_holes
 

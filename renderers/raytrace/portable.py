@@ -22,6 +22,7 @@ from aliasbench.renderers.raytrace.cutouts import find_holes
 from aliasbench.renderers.raytrace.film import Film
 from aliasbench.renderers.raytrace.lanes import (
     LANES,
+    PERSPECTIVE,
     RAY_DX,
     RAY_OX,
     RAY_SIZE,
@@ -68,14 +69,24 @@ class _Triangles:
             triangles = triangles.reshape(-1, 3).astype(np.int32)
             TriangleMesh(self._scene, mesh.vertices[used].astype(np.float32), triangles)
 
-    def trace(self, origins: RayArray, directions: RayArray) -> tuple[RayArray, NDArray[np.int32]]:
-        """Return distances (n,) and triangles of the nearest hits, inf and MISS where there is none."""
+    def trace(self, origins: RayArray, directions: RayArray, *, ahead: bool) -> tuple[RayArray, NDArray[np.int32]]:
+        """Return distances (n,) and triangles of the nearest hits, inf and MISS where there is none.
+
+        With `ahead` those at distance 0 do not count: in a polygon's plane a camera sees nothing of it.
+        """
         if self._scene is None or not len(origins):
             return np.full(len(origins), np.inf, np.float32), np.full(len(origins), MISS, np.int32)
         found = self._scene.run(origins, directions, output=1)
         is_hit = found["geomID"] >= 0
         distances = np.where(is_hit, found["tfar"], np.float32(np.inf))
-        return distances, np.where(is_hit, self.rows[np.where(is_hit, found["primID"], 0)], np.int32(MISS))
+        hits = np.where(is_hit, self.rows[np.where(is_hit, found["primID"], 0)], np.int32(MISS))
+        at_start = distances <= 0.0
+        if ahead and at_start.any():
+            # embreex knows no least distance; what is not at 0 then is where it was, to float32
+            step = np.float32(1e-20) + np.float32(2.0**-20) * np.abs(origins[at_start]).max(axis=1, keepdims=True)
+            started = origins[at_start] + step * directions[at_start]
+            distances[at_start], hits[at_start] = self.trace(started, directions[at_start], ahead=False)
+        return distances, hits
 
     def halves(self) -> tuple["_Triangles", ...]:
         """Return the first and the second half, none of a single triangle; they are built once."""
@@ -106,7 +117,7 @@ class _Search:
     def look(self, body: _Body, rays: RayArray, first: int) -> None:
         """Take nearer hits on a body, whose triangles are numbered from `first` on, by rays in its frame."""
         origins, directions = _vectors(rays, RAY_OX), _vectors(rays, RAY_DX)
-        distances, found = body.solid.trace(origins, directions)
+        distances, found = body.solid.trace(origins, directions, ahead=self.camera[PERSPECTIVE] == 1.0)
         is_nearer = distances < self.nearest
         self.nearest[is_nearer] = distances[is_nearer]
         self.hits[is_nearer] = first + found[is_nearer]
@@ -116,7 +127,7 @@ class _Search:
     def _look_through(
         self, triangles: _Triangles, origins: RayArray, directions: RayArray, first: int, lanes: NDArray[np.int64]
     ) -> None:
-        distances, found = triangles.trace(origins[lanes], directions[lanes])
+        distances, found = triangles.trace(origins[lanes], directions[lanes], ahead=self.camera[PERSPECTIVE] == 1.0)
         is_nearer = distances < self.nearest[lanes]
         lanes, distances, found = lanes[is_nearer], distances[is_nearer], first + found[is_nearer]
         holes = np.zeros(len(lanes), np.bool_)

@@ -76,7 +76,7 @@ def test_an_infinite_gaussian_is_for_reference_and_distribution() -> None:
         ("raytrace:spp=nan", "must be a whole number"),
         ("raytrace:spp", "spp needs a value"),
         ("raytrace:spp=", "spp needs a value"),
-        ("raytrace:spp=4,", "unknown key of raytrace ''"),
+        ("raytrace:spp=4,", "there is nothing between two commas or after the last"),
         ("raytrace:spp=4,spp=4", "spp is given twice"),
         ("raytrace:spp=4,sampler=jiterred", "did you mean 'jittered'"),
         ("raytrace:filter=gaussian,sigma=nan", "sigma=nan: must be a finite number"),

@@ -16,6 +16,7 @@ from aliasbench.bench import cli
 from aliasbench.renderers.catalog import prepare, render
 from aliasbench.scenes.errors import InputError
 from aliasbench.scenes.model import Camera, Light, Material, Scene, Surface, read_only
+from aliasbench.scenes.shapes import polygon
 
 NAN, INF = math.nan, math.inf
 BACKGROUND = (0.25, 0.5, 3.0)
@@ -234,3 +235,26 @@ def test_a_camera_within_a_wall_gives_a_finite_picture(quad: Any, flat_scene: An
     for technique in ("spp=16", "spp=4,filter=tent", "adaptive=unbiased"):
         pixels = render(flat_scene([wall], camera=camera), "raytrace:" + technique, size=(8, 8)).pixels
         assert np.isfinite(pixels).all()
+
+
+@pytest.mark.parametrize("engine", ["packet", "portable"])
+@pytest.mark.parametrize("more", ["", ",robust=off", ",spp=4,filter=tent"])
+def test_a_camera_in_a_polygon_s_plane_sees_nothing_of_it(engine: str, more: str) -> None:
+    """Also within its outline; another surface is seen as if it were not there."""
+    corners = [(-9.0, 0.0, 9.0), (9.0, 0.0, 9.0), (9.0, 0.0, -9.0), (-9.0, 0.0, -9.0)]
+    wall = polygon([(-2.0, -1.0, -4.0), (1.0, -1.0, -4.0), (1.0, 1.5, -4.0)], color=(0.2, 0.5, 0.9))
+    camera = Camera("perspective", position=(0.0, 0.0, 4.0), target=(0.0, 0.5, 0.0), fov_y_deg=50.0)
+    with_floor = Scene("floor", camera, (polygon(corners), wall), background=(0.1, 0.2, 0.3))
+    alone = Scene("wall", camera, (wall,), background=(0.1, 0.2, 0.3))
+    technique = f"raytrace:engine={engine}{more}"
+    shown, expected = (render(scene, technique, size=(24, 18)).pixels for scene in (with_floor, alone))
+    assert np.ptp(expected) > 0.3
+    np.testing.assert_allclose(shown, expected, atol=1e-6)
+
+
+def test_one_pattern_whose_weights_nearly_cancel_keeps_what_is_flat() -> None:
+    scene = Scene("flat", Camera("orthographic", height=2.0), (), background=(0.2, 0.3, 0.4))
+    text = "raytrace:spp=2,pattern=shared,sampler=multijittered,filter=mitchell,radius=0.3"
+    for seed in range(6):
+        pixels = render(scene, text, size=(6, 5), seed=seed).pixels
+        np.testing.assert_allclose(pixels, np.broadcast_to((0.2, 0.3, 0.4), (5, 6, 3)), rtol=2e-4)
