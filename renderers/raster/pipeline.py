@@ -233,10 +233,10 @@ def _coarse_objects(
     surfaces: NDArray[np.int32],
     shadings: Sequence[Shading],
 ) -> BoolArray:
-    """Return which objects have texture coordinates that float32 does not resolve."""
+    """Return which objects have an analytic texture with coordinates that float32 does not resolve."""
     out = np.zeros(len(shadings), dtype=bool)
     if len(triangles):
         largest = np.abs(vertices["texcoord"]).max(axis=1)[triangles].max(axis=1)
         beyond = np.unique(surfaces[largest > _MOST_REPEATS])
-        out[beyond] = [shadings[k].periodic and shadings[k].kind != "PLAIN" for k in beyond]
+        out[beyond] = [shadings[k].periodic and shadings[k].kind not in ("PLAIN", "IMAGE") for k in beyond]
     return out
