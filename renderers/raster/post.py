@@ -90,7 +90,7 @@ _FILTERS: dict[str, type[Fxaa] | type[Smaa]] = {"fxaa": Fxaa, "smaa": Smaa}
 
 
 class Post:
-    """The processing that a technique asks for, of pictures of one size."""
+    """The processing that a technique asks for, of pictures of one size; those that are `summed` come from the host."""
 
     def __init__(
         self,
@@ -100,11 +100,13 @@ class Post:
         technique: Technique,
         target: Target,
         size: tuple[int, int],
+        *,
+        summed: bool,
     ) -> None:
         self._uploaded: Uploaded | None = None
         with ExitStack() as made:
             try:
-                if technique.passes > 1:
+                if summed:
                     self._uploaded = Uploaded(context, size, made)
                 source = self._uploaded or target.output
                 self._taa: Taa | None = None

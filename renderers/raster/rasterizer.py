@@ -140,14 +140,16 @@ class RasterScene:
             context.release_left_over()
             self._target = Target(context, self._layout, technique, depth_rule(scene.camera), self._optics)
             made.callback(self._target.release)
+            self._buffers = SceneBuffers(context, scene, bodies, technique, self._layout.full)
+            made.callback(self._buffers.release)
+            self._most_rays = None if self._buffers.light is None else self._buffers.light.most_rays
+            # compiles the kernels at the first call of a process: that is no rendering
+            first = Exposures(technique, self._optics, 0, 0, self._most_rays)
             self._post: Post | None = None
             if technique.post != "none":
-                self._post = Post(context, scene, self._placement, technique, self._target, size)
+                summed = len(first) > 1
+                self._post = Post(context, scene, self._placement, technique, self._target, size, summed=summed)
                 made.callback(self._post.release)
-            self._buffers = SceneBuffers(context, scene, bodies, technique, self._layout.full)
-            # compiles the kernels at the first call of a process: that is no rendering
-            self._most_rays = None if self._buffers.light is None else self._buffers.light.most_rays
-            first = Exposures(technique, self._optics, 0, 0)
             # one sample in the middle of everything is the same in every frame
             is_fixed = technique.sampler == "center" and technique.passes * technique.shadow_rays == 1
             self._fixed = first if is_fixed else None

@@ -60,6 +60,13 @@ def test_many_shadow_rays_count_once_under_signed_weights():
     assert (np.abs(drawn - traced).max(axis=2) > 1e-3).mean() < 0.03
 
 
+def test_what_is_drawn_in_turns_is_processed_as_a_whole(monkeypatch):
+    scene, size = load_scene("soft-shadow"), (24, 18)
+    expected = render(scene, "raster:shadow_rays=24,post=smaa", size=size).pixels
+    monkeypatch.setattr("aliasbench.renderers.raster.lighting._MOST_TURNS", 100)
+    np.testing.assert_allclose(render(scene, "raster:shadow_rays=24,post=smaa", size=size).pixels, expected, atol=1e-5)
+
+
 def test_textures_that_float32_cannot_tell_apart_are_refused():
     surface = polygon(SQUARE, uv=np.array(UV), texture="checks")
     for squares in (1e7, 1e9):
