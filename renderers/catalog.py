@@ -3,15 +3,13 @@
 Heavy imports happen here, when a renderer is first used.
 """
 
-import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from numbers import Integral
 from types import TracebackType
 from typing import Self
 
-import numpy as np
-
 from aliasbench.renderers.frame import Frame, Prepared, Progress
+from aliasbench.renderers.soundness import check_scene
 from aliasbench.renderers.technique import Technique, parse_technique
 from aliasbench.scenes.errors import InputError
 from aliasbench.scenes.model import Scene
@@ -110,24 +108,8 @@ def prepare(scene: Scene, technique: str | Technique, *, size: tuple[int, int]) 
     """
     if not isinstance(scene, Scene):
         raise TypeError(f"scene must be a Scene (see scenes.files.load_scene), not {type(scene).__name__}")
-    _refuse_nonfinite(scene)
+    check_scene(scene)
     return CheckedScene(_prepare(scene, resolve_technique(technique), _checked_size(size)))
-
-
-def _refuse_nonfinite(scene: Scene) -> None:
-    """Raise for numbers that no scene file can hold but a scene built in Python may: they would vanish or spread."""
-    named: list[tuple[str, Iterable[float]]] = [("background", scene.background)]
-    for k, surface in enumerate(scene.objects):
-        label = surface.name or f"number {k}"
-        named.append((f"color of object {label}", surface.color))
-        for what, values in (("vertices", surface.vertices), ("uv", surface.uv)):
-            if values is not None and not np.isfinite(values).all():
-                raise InputError(f"scene {scene.name!r}: {what} of object {label} are not all finite numbers")
-    for k, light in enumerate(scene.lights):
-        named += [(f"quad of light {k}", sum(light.quad, ())), (f"radiance of light {k}", light.radiance)]
-    for what, numbers in named:
-        if not all(map(math.isfinite, numbers)):
-            raise InputError(f"scene {scene.name!r}: {what} must be finite numbers, not {tuple(numbers)}")
 
 
 def _checked_size(size: tuple[int, int]) -> tuple[int, int]:

@@ -15,7 +15,7 @@ import pytest
 from aliasbench.bench import cli
 from aliasbench.renderers.catalog import prepare, render
 from aliasbench.scenes.errors import InputError
-from aliasbench.scenes.model import Camera, Light, Material, Scene, Surface, read_only
+from aliasbench.scenes.model import Animation, Camera, Light, Material, Motion, Scene, Spin, Surface, read_only
 from aliasbench.scenes.shapes import polygon
 
 NAN, INF = math.nan, math.inf
@@ -156,7 +156,7 @@ SPOILS: dict[str, tuple[Callable[[Scene], Scene], str]] = {
     ),
     "camera": (
         lambda s: dataclasses.replace(s, camera=Camera("orthographic", height=4.0, position=(NAN, 0.0, 5.0))),
-        "camera: position equals target",
+        "position of the camera must be finite numbers",
     ),
 }
 
@@ -258,3 +258,42 @@ def test_one_pattern_whose_weights_nearly_cancel_keeps_what_is_flat() -> None:
     for seed in range(6):
         pixels = render(scene, text, size=(6, 5), seed=seed).pixels
         np.testing.assert_allclose(pixels, np.broadcast_to((0.2, 0.3, 0.4), (5, 6, 3)), rtol=2e-4)
+
+
+@pytest.mark.parametrize("renderer", ["raytrace:", "raster:", "reference:"])
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"camera": {"height": 0.0}}, "height of the camera is 0.0; it must be a finite number above 0"),
+        ({"camera": {"height": math.nan}}, "height of the camera is nan; it must be a finite number above 0"),
+        ({"camera": {"position": (0.0, math.inf, 1.0)}}, "position of the camera must be finite numbers"),
+        ({"camera": {"velocity": (math.nan, 0.0, 0.0)}}, "velocity of the camera must be finite numbers"),
+        ({"camera": {"lens_radius": -1.0}}, "lens_radius of the camera is -1.0; it must be 0 or more"),
+        ({"camera": {"lens_radius": math.nan}}, "lens_radius of the camera must be finite numbers"),
+        ({"camera": {"focus_distance": 0.0}}, "focus_distance of the camera is 0.0"),
+        ({"animation": {"fps": 0.0}}, "fps of the animation is 0.0; it must be above 0"),
+        ({"animation": {"shutter": math.nan}}, "shutter of the animation must be finite numbers"),
+        ({"animation": {"shutter": 1.5}}, "shutter of the animation is 1.5; it must be from 0 to 1"),
+        ({"motion": Motion((math.nan, 0.0, 0.0))}, "velocity of object number 0 must be finite numbers"),
+        ({"motion": Motion(matrices=((math.nan,) * 16, (0.0,) * 16))}, "matrices of object number 0 must be finite"),
+        (
+            {"motion": Motion(spin=Spin((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 1.0))},
+            "axis of the spin of object number 0 is",
+        ),
+        (
+            {"material": Material("glossy", roughness=2.0)},
+            "roughness of object number 0 is 2.0; it must be from 0 to 1",
+        ),
+        ({"material": Material("glossy", roughness=math.nan)}, "material of object number 0 must be finite numbers"),
+    ],
+)
+def test_numbers_that_mean_nothing_are_refused_by_name(renderer: str, change: dict[str, Any], message: str) -> None:
+    surface = polygon([(-1.0, -1.0, 0.0), (1.0, -1.0, 0.0), (0.0, 1.0, 0.0)])
+    for key in ("motion", "material"):
+        if key in change:
+            surface = dataclasses.replace(surface, **{key: change[key]})
+    camera = dataclasses.replace(Camera("orthographic", height=2.0), **change.get("camera", {}))
+    animation = dataclasses.replace(Animation(), **change.get("animation", {}))
+    scene = Scene("bad", camera, (surface,), animation=animation)
+    with pytest.raises(InputError, match=re.escape(message)):
+        prepare(scene, renderer, size=(8, 8))
