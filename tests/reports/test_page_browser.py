@@ -123,6 +123,10 @@ def test_nothing_is_wider_than_the_window_and_the_theme_follows(opened: Opened) 
             page.set_viewport_size({"width": width, "height": 844})
             page.wait_for_function("w => document.querySelector('.chart .main-svg').clientWidth < w", arg=width)
             assert page.evaluate("document.documentElement.scrollWidth") <= width
+            # beside the techniques' names there is room for a figure
+            figure = page.locator("#overview tbody tr:first-child td.shaded").first.bounding_box()
+            assert figure is not None
+            assert figure["x"] + figure["width"] <= width
             # The chart is drawn anew for each width: all its points come back.
             page.wait_for_function("document.querySelectorAll('.chart .scatterlayer .point').length === 4")
         assert page.evaluate("getComputedStyle(document.body).backgroundColor") == background
