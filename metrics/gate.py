@@ -6,7 +6,9 @@ reference) raises; what is wrong with the picture under test is a status that th
 """
 
 import math
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +18,7 @@ from aliasbench.scenes.model import FloatArray, Scene
 
 # Rec. 709 luminance of linear RGB.
 LUMINANCE = (0.2126, 0.7152, 0.0722)
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,6 +44,8 @@ class Signals:
         Largest error of a reference pixel, in units of the contrast.
     frame_start : int
         The scene's number of the first frame.
+    kept : dict
+        What several metrics are made from (see `once`).
     """
 
     test: FloatArray
@@ -54,6 +59,13 @@ class Signals:
     radius_px: float
     uncertainty: float
     frame_start: int
+    kept: dict[str, object] = field(default_factory=dict, repr=False)
+
+    def once(self, name: str, make: Callable[[], T]) -> T:
+        """Return what `make` returns, made once for all metrics that ask for it under that name."""
+        if name not in self.kept:
+            self.kept[name] = make()
+        return cast(T, self.kept[name])
 
     @property
     def seeds(self) -> int:

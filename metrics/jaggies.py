@@ -42,6 +42,10 @@ class Locator:
 
 def locate_edges(signals: Signals) -> list[Locator]:
     """Return the displacement of every edge in every frame in which it has columns to read."""
+    return signals.once("edges", lambda: _locate(signals))
+
+
+def _locate(signals: Signals) -> list[Locator]:
     carriers = [carrier_of(edge, signals.scene) for edge in signals.scene.facts.edges]
     out = []
     for index in range(signals.frames):

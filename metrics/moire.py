@@ -19,6 +19,8 @@ WHOLE_PERIODS = 1e-6
 NOTHING = 1e-26
 BLOCK, BLOCK_STEP = 32, 16
 
+Spectrum = tuple[NDArray[np.complex128], tuple[int, int], NDArray[np.bool_], bool]
+
 
 def visible_band(shape: tuple[int, int]) -> tuple[FloatArray, FloatArray, NDArray[np.bool_], FloatArray]:
     """Return the frequencies (h, 1) and (1, w') of a real transform, the band's bins and how often each counts.
@@ -58,12 +60,16 @@ def whole_periods(side: int, cycles_per_px: list[float]) -> int | None:
     return None
 
 
-def prepare_spectrum(signals: Signals) -> tuple[NDArray[np.complex128], tuple[int, int], NDArray[np.bool_], bool]:
+def prepare_spectrum(signals: Signals) -> Spectrum:
     """Return the error's spectrum (seeds, frames, h, w'), the size it was taken of, the band, and whether windowed.
 
     Where the scene declares gratings, the picture is trimmed to whole periods of them and their own lines are left out
     (an error there is a filter's amplitude, not a false pattern); where that cannot be done a Hann window is used.
     """
+    return signals.once("spectrum of the error", lambda: _prepare(signals))
+
+
+def _prepare(signals: Signals) -> Spectrum:
     height, width = signals.error.shape[-2:]
     known = known_frequencies(signals)
     trimmed = [whole_periods(side, [nu[axis] for nu in known]) for axis, side in ((1, height), (0, width))]

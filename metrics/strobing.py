@@ -7,6 +7,7 @@ rendered exactly. After Watson, Ahumada and Farrell 1986 (the window of visibili
 """
 
 from dataclasses import asdict, dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -55,7 +56,12 @@ def strobe_share(orders: Orders, fps: float) -> tuple[float, dict[str, object]]:
     return share, extras
 
 
-def _all_orders(signals: Signals, picture: FloatArray) -> list[Orders] | Score:
+def _all_orders(signals: Signals, which: Literal["test", "error"]) -> list[Orders] | Score:
+    picture = signals.test if which == "test" else signals.error
+    return signals.once(f"orders of {which}", lambda: _measure_all(signals, picture))
+
+
+def _measure_all(signals: Signals, picture: FloatArray) -> list[Orders] | Score:
     out = []
     for number, rotor in enumerate(signals.scene.facts.rotors):
         orders = measure_orders(signals, picture, rotor)
@@ -67,7 +73,7 @@ def _all_orders(signals: Signals, picture: FloatArray) -> list[Orders] | Score:
 
 def compute_strobing(signals: Signals) -> Score:
     """Return STROBE_abs in [0, 1]: the root of the visible aliased share; quadratic mean over rotors."""
-    rotors = _all_orders(signals, signals.test)
+    rotors = _all_orders(signals, "test")
     if isinstance(rotors, Score):
         return rotors
     shares, extras = zip(*(strobe_share(o, signals.scene.animation.fps) for o in rotors), strict=True)
@@ -76,7 +82,7 @@ def compute_strobing(signals: Signals) -> Score:
 
 def compute_strobing_err(signals: Signals) -> Score:
     """Return STROBE_err: the RMS difference of all resolved orders from the reference's, per sharp pattern's RMS."""
-    rotors = _all_orders(signals, signals.error)
+    rotors = _all_orders(signals, "error")
     if isinstance(rotors, Score):
         return rotors
     values, floors = [], []
@@ -162,7 +168,7 @@ def compute_apparent_rate(signals: Signals) -> Score:
     Of several rotors the first; extras hold all orders of all of them, the share that seems to turn backwards and the
     mean speed error.
     """
-    rotors = _all_orders(signals, signals.test)
+    rotors = _all_orders(signals, "test")
     if isinstance(rotors, Score):
         return rotors
     extras = []
