@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 Better = Literal["lower", "higher", "zero", "truth"]
 Need = Literal["reference", "frames", "seeds", "edges", "rotors", "pans"]
+BLOCK = 1 << 16
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,8 +79,10 @@ def rms(values: FloatArray) -> float:
         return 0.0
     # Squares and their sum stay within range by far, so that the copy which scaling needs is not made.
     if 1e-100 < largest < 1e100:
+        # einsum: a dot product of this length starts threads of its own. In blocks: rounding grows with their length.
         flat = values.ravel()
-        return math.sqrt(float(flat @ flat) / flat.size)
+        blocks = (flat[start : start + BLOCK] for start in range(0, flat.size, BLOCK))
+        return math.sqrt(math.fsum(float(np.einsum("i,i->", block, block)) for block in blocks) / flat.size)
     return largest * math.sqrt(float(np.mean(np.square(values / largest))))
 
 
