@@ -39,11 +39,17 @@ def _filters() -> Rows:
 
 
 def _metrics() -> Rows:
-    from aliasbench.metrics.catalog import METRICS
+    from aliasbench.metrics.catalog import METRICS, OPTIONAL
+    from aliasbench.metrics.score import Metric
+
+    def summary(m: Metric) -> str:
+        return (
+            f"{m.label} ({m.unit}; better: {m.better}{'; only where a suite names it' if m.name in OPTIONAL else ''})"
+        )
 
     return [
-        {"name": m.name, "summary": f"{m.label} ({m.unit}; better: {m.better})", "unit": m.unit, "better": m.better}
-        for m in METRICS.values()
+        {"name": m.name, "summary": summary(m), "unit": m.unit, "better": m.better}
+        for m in (*METRICS.values(), *OPTIONAL.values())
     ]
 
 

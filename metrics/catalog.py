@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from aliasbench.metrics import bias, error, jaggies, moire, shimmer, strobing, structure
+from aliasbench.metrics import bias, error, jaggies, moire, perceptual, shimmer, strobing, structure, video_quality
 from aliasbench.metrics.gate import Signals, open_gate
 from aliasbench.metrics.score import Metric, Score, finish
 from aliasbench.scenes.errors import NotAvailableError, unknown_name
@@ -17,6 +17,7 @@ from aliasbench.scenes.model import Scene
 
 _WANG = "Wang, Bovik, Sheikh, Simoncelli 2004"
 _BURNS = "area locator of a known edge; after Burns 2006, ISO/IEC 24790"
+_ANDERSSON = "Andersson et al. 2020, for bright scenes 2021; OpenImageIO"
 _WATSON = "angular harmonics; after Watson, Ahumada, Farrell 1986"
 _SPLIT = "unbiased split over seeds; after Durand 2011, Subr and Kautz 2013"
 
@@ -30,6 +31,7 @@ METRICS: Mapping[str, Metric] = {
             "max_error", "largest error", "contrast", "lower", ("reference",), error.compute_max_error, "definition"
         ),
         Metric("ssim", "SSIM", "1", "higher", ("reference",), error.compute_ssim, _WANG),
+        Metric("flip", "FLIP", "1", "lower", ("reference",), perceptual.compute_flip, _ANDERSSON),
         Metric("jaggies", "jaggies (J_std)", "px", "lower", ("reference", "edges"), jaggies.compute_jaggies, _BURNS),
         Metric(
             "jaggies_rms",
@@ -133,8 +135,24 @@ METRICS: Mapping[str, Metric] = {
     )
 }
 
+# Measured only where they are named: they need an extra to be installed, and minutes where the others need seconds.
+OPTIONAL: Mapping[str, Metric] = {
+    m.name: m
+    for m in (
+        Metric(
+            "cvvdp",
+            "ColorVideoVDP",
+            "JOD",
+            "higher",
+            ("reference",),
+            video_quality.compute_cvvdp,
+            "Mantiuk, Hanji, Ashraf, Asano, Chapiro 2024; cvvdp",
+        ),
+    )
+}
+
 # Documented, defined, and not in this version.
-PLANNED = ("edge_width", "flip", "mtf50")
+PLANNED = ("edge_width", "mtf50")
 
 
 def find_metric(name: str) -> Metric:
@@ -151,8 +169,10 @@ def find_metric(name: str) -> Metric:
         raise NotAvailableError(
             f"metric {name!r} is not available in this version; available: {', '.join(sorted(METRICS))}"
         )
+    if name in OPTIONAL:
+        return OPTIONAL[name]
     if name not in METRICS:
-        raise unknown_name("metric", name, (*METRICS, *PLANNED))
+        raise unknown_name("metric", name, (*METRICS, *OPTIONAL, *PLANNED))
     return METRICS[name]
 
 
@@ -171,7 +191,7 @@ def measure(
     Parameters
     ----------
     name : str
-        A key of `METRICS`.
+        A key of `METRICS` or `OPTIONAL`.
     test : (frames, h, w, 3) or (seeds, frames, h, w, 3) floating
         Linear radiance.
     reference : (frames, h, w, 3) floating

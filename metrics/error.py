@@ -78,12 +78,18 @@ def high_percentile(values: FloatArray, percent: float) -> float:
     return float(np.percentile(upper, 100.0 * place))
 
 
+def key_frames(frames: int) -> list[int]:
+    """Return the first, middle and last of so many frames, ascending, each once: what costly metrics look at."""
+    return sorted({round(k * (frames - 1) / (KEY_FRAMES - 1)) for k in range(KEY_FRAMES)})
+
+
 def compute_ssim(signals: Signals) -> Score:
     """Return the mean structural similarity of the first, middle and last frame (1 is identical).
 
-    Gaussian window of sigma 1.5, population covariance, `data_range` the contrast; 11 x 11 pixels, or 7 x 7 in pictures
-    too small for that. It takes 40 ms for 512 x 512, hence key frames. Negative pixels (lobes of a filter) are set to 0
-    in the copies it sees, and counted. Wang, Bovik, Sheikh, Simoncelli 2004.
+    Gaussian window of sigma 1.5 over 11 x 11 pixels, population covariance, `data_range` the contrast. The mean leaves
+    out a border of half a window; in pictures below 11 pixels, whose windows are filled by reflection, one of 3 pixels.
+    It takes 40 ms for 512 x 512, hence key frames. Negative pixels (lobes of a filter) are set to 0 in the copies it
+    sees, and counted. Wang, Bovik, Sheikh, Simoncelli 2004.
     """
     from skimage.metrics import structural_similarity
 
@@ -91,7 +97,7 @@ def compute_ssim(signals: Signals) -> Score:
     side = min(height, width)
     if side < 7:
         return Score(None, "undefined_too_small", {"size": [width, height], "smallest": 7})
-    keys = sorted({round(k * (signals.frames - 1) / (KEY_FRAMES - 1)) for k in range(KEY_FRAMES)})
+    keys = key_frames(signals.frames)
     values = []
     negative = 0
     for frame in keys:
@@ -110,8 +116,15 @@ def compute_ssim(signals: Signals) -> Score:
                     win_size=11 if side >= 11 else 7,
                 )
             )
-    extras = {"frames": [k + signals.frame_start for k in keys], "negative_pixels": negative}
+    extras = {
+        "frames": [k + signals.frame_start for k in keys],
+        "negative_pixels": negative,
+        "lowest": float(np.min(values)),
+        "data_range": signals.scene.contrast,
+        "sigma_px": SSIM_SIGMA,
+    }
     error = rms(signals.error)
     if error < signals.floor:
-        return Score(None, "below_reference_floor", {**extras, "floor": signals.floor, "measured_rmse": error})
+        # Not `floor`, which is in the metric's own unit.
+        return Score(None, "below_reference_floor", {**extras, "rmse_floor": signals.floor, "measured_rmse": error})
     return Score(float(np.mean(values)), "ok", extras)

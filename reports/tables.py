@@ -8,7 +8,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from aliasbench.metrics.catalog import METRICS
+from aliasbench.metrics.catalog import METRICS, OPTIONAL
 from aliasbench.reports.charts import RENDERER_NAMES, number
 from aliasbench.reports.records import Record, Score
 
@@ -162,7 +162,7 @@ def _run_cell(record: Record, runs: Sequence[str]) -> list[Cell]:
 
 
 def _metric_heading(name: str) -> Heading:
-    entry = METRICS.get(name)
+    entry = METRICS.get(name) or OPTIONAL.get(name)
     if entry is None:
         return Heading(name, "", True)
     arrow = {"low": " ↓", "hig": " ↑"}.get(str(entry.better)[:3], "")
@@ -172,7 +172,7 @@ def _metric_heading(name: str) -> Heading:
 
 
 def _best(name: str, records: Sequence[Record]) -> float | None:
-    entry = METRICS.get(name)
+    entry = METRICS.get(name) or OPTIONAL.get(name)
     values = [v for v in (r.value(name) for r in records) if v is not None]
     if entry is None or len(values) < 2:
         return None

@@ -7,6 +7,7 @@ import pytest
 
 from aliasbench.bench.suite import Request, plan_run
 from aliasbench.bench.suite_file import SUITES, Group, parse_suite, read_suite
+from aliasbench.metrics.catalog import PLANNED
 from aliasbench.scenes.errors import InputError, NotAvailableError
 
 SMALL = """
@@ -184,9 +185,15 @@ def test_a_suite_says_what_is_missing(text: str, sentence: str) -> None:
         parse_suite(text, "S", None, "s")
 
 
-def test_a_metric_that_is_planned_is_not_available() -> None:
-    with pytest.raises((InputError, NotAvailableError), match=r"S: metrics = \['flip'\]: .*not available"):
-        parse_suite("schema = 1\nmetrics = ['flip']", "S", None, "s")
+@pytest.mark.parametrize("name", PLANNED)
+def test_a_metric_that_is_planned_is_not_available(name: str) -> None:
+    with pytest.raises((InputError, NotAvailableError), match=rf"S: metrics = \['{name}'\]: .*not available"):
+        parse_suite(f"schema = 1\nmetrics = ['{name}']", "S", None, "s")
+
+
+def test_a_suite_may_name_metrics_that_are_not_measured_by_default() -> None:
+    text = "schema = 1\nmetrics = ['rmse', 'cvvdp']\n[[case]]\nscenes = ['a']\ntechniques = ['b']"
+    assert parse_suite(text, "S", None, "s").groups[0].metrics == ("rmse", "cvvdp")
 
 
 def test_groups_take_from_above_what_they_leave_out() -> None:

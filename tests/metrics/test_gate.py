@@ -135,7 +135,7 @@ def test_splits_over_seeds_need_seeds(scene, name, seeds):
 
 
 @pytest.mark.parametrize(
-    "name", ["rmse", "psnr", "relmse", "max_error", "ssim", "shimmer", "buzz", "moire", "moire_peak"]
+    "name", ["rmse", "psnr", "relmse", "max_error", "ssim", "flip", "shimmer", "buzz", "moire", "moire_peak"]
 )
 def test_no_score_stands_below_three_times_the_references_uncertainty(scene, name):
     rng = np.random.default_rng(1)
