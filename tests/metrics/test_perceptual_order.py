@@ -3,10 +3,11 @@
 Needs the extra `perceptual`; `python -m pytest tests/metrics/test_perceptual_order.py -s` prints the table.
 
 Within a scene they agree: rank correlations of -0.85 to -0.95, with 111 of 117 pairs of techniques that shimmer unlike
-in the same order. All six exceptions set trilinear filtering against many samples. What is left of it is blur, which
-moves with the surface and which the model, as observers, forgives; passes share one pattern, so that their error is
-correlated between neighbours and lies at frequencies that are seen, where per-pixel patterns leave fine noise. Confetti
-has the weakest rank correlation since five of the techniques make one picture there, and ranks among equals are chance.
+in the same order. All six exceptions set trilinear filtering against passes or rays of several samples: its error is
+mostly blur, which counts less in the model. At equal shimmer passes score below rays, probably since they share one
+pattern, so that neighbours err alike, at frequencies that are seen, where patterns of each pixel leave fine noise.
+Confetti has the weakest rank correlation since four of the techniques make nearly one picture there, and ranks among
+equals are chance.
 
 Between scenes shimmer says less (-0.67, where FLIP has -0.97): it is linear in radiance and an average over the
 picture, so that a dark ground (confetti: the same error is a greater contrast) and a small object (distant-triangle)
