@@ -38,6 +38,8 @@ class EdgeWindow:
         The window's first row in each of them.
     rows : int
         The window's height, the same in all columns.
+    reach : float
+        In every column at least the pixels whose middles are up to this far above and below the line are read.
     """
 
     transposed: bool
@@ -47,6 +49,7 @@ class EdgeWindow:
     columns: NDArray[np.int64]
     first_row: NDArray[np.int64]
     rows: int
+    reach: float
 
 
 def outline_has(surface: Surface, rest: FloatArray, segment: FloatArray) -> bool:
@@ -159,7 +162,14 @@ def _window(ends: list[FloatArray], others: list[FloatArray], signals: Signals) 
     if not usable.any():
         return None
     return EdgeWindow(
-        transposed, slope, intercept, sign, columns[usable].astype(np.int64), first_row[usable].astype(np.int64), rows
+        transposed,
+        slope,
+        intercept,
+        sign,
+        columns[usable].astype(np.int64),
+        first_row[usable].astype(np.int64),
+        rows,
+        half - 0.5,
     )
 
 

@@ -11,13 +11,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from aliasbench.metrics.crawl import crawl_of_edges
 from aliasbench.metrics.edges import EdgeWindow, carrier_of, edge_windows
 from aliasbench.metrics.gate import Signals
 from aliasbench.metrics.score import Score, rms, settle, signed_root
 from aliasbench.scenes.model import FloatArray
 
 HARMONICS = 8
+# Pixels per degree of the display for which stairs are weighted by how well they are seen.
+PPD = 60.0
 FEWEST_COLUMNS = 32
+# Maximum of (.0192 + f) exp(-f^1.1) over f, where 1.1 f^.1 (.0192 + f) = 1.
+SENSITIVITY_PEAK = 0.37726072
 # Relative size below which a harmonic is the same as others at this slope, and counted with them.
 DEPENDENT = 1e-6
 
@@ -47,10 +52,11 @@ def locate_edges(signals: Signals) -> list[Locator]:
 
 def _locate(signals: Signals) -> list[Locator]:
     carriers = [carrier_of(edge, signals.scene) for edge in signals.scene.facts.edges]
+    still = edge_windows(signals, carriers, signals.frame_start) if signals.scene.is_static else None
     out = []
     for index in range(signals.frames):
         frame = index + signals.frame_start
-        for edge, window in enumerate(edge_windows(signals, carriers, frame)):
+        for edge, window in enumerate(still or edge_windows(signals, carriers, frame)):
             if window is None:
                 continue
             error = signals.error[:, index]
@@ -125,6 +131,17 @@ class Stairs:
     noise_variance: float
     rank: int
     harmonics: FloatArray
+    visible_square: float
+
+
+def contrast_sensitivity(cycles_per_degree: FloatArray) -> FloatArray:
+    """Return how well a frequency is seen against the best, which has 1 at 8 cycles per degree.
+
+    2.6 (.0192 + .114 f) exp(-(.114 f)^1.1), Mannos and Sakrison 1974, over its maximum .98.
+    """
+    f = np.abs(0.114 * np.asarray(cycles_per_degree, dtype=np.float64))
+    out: FloatArray = (0.0192 + f) * np.exp(-(f**1.1)) / SENSITIVITY_PEAK
+    return out
 
 
 def split_stairs(locator: Locator) -> Stairs:
@@ -152,13 +169,25 @@ def split_stairs(locator: Locator) -> Stairs:
     else:
         variance = rest * count / max(count - 1 - rank, 1)
     c = np.abs(np.mean(r * np.exp(-1j * turns), axis=1))
-    return Stairs(projected - variance * rank / count, rest, variance, rank, c)
+    square = projected - variance * rank / count
+    # Harmonics that are the same vector show the same power: their sum is no measure, but tells the shares.
+    weight = contrast_sensitivity(np.arange(1.0, HARMONICS + 1) * stairs_per_px(locator.window) * PPD)
+    power = float(np.sum(c**2))
+    seen = float(np.sum((weight * c) ** 2)) / power if power > 0.0 else 0.0
+    return Stairs(square, rest, variance, rank, c, square * seen)
+
+
+def stairs_per_px(window: EdgeWindow) -> float:
+    """Return how many pixel rows the edge crosses per pixel of its length."""
+    return abs(window.slope) / float(np.hypot(1.0, window.slope))
 
 
 def compute_jaggies_str(signals: Signals) -> Score:
     """Return J_str, the root of the mean structured square; extras keep the square with its sign.
 
-    The value carries the sign of the square: noise alone gives values on both sides of 0.
+    The value carries the sign of the square: noise alone gives values on both sides of 0. Further extras: `visible`,
+    the same with the harmonics weighted by how well they are seen on a display of 60 pixels per degree, and `crawl`,
+    the stairs' speed along moving edges (`crawl.crawl_of_edges`).
     """
     locators = locate_edges(signals)
     if not locators:
@@ -169,6 +198,7 @@ def compute_jaggies_str(signals: Signals) -> Score:
         return Score(None, "undefined_too_small", {"columns": most, "smallest": FEWEST_COLUMNS})
     stairs = [split_stairs(x) for x in long]
     square = _mean(np.array([s.square for s in stairs]))
+    floor = signals.floor * max(x.window.rows for x in long)
     extras = {
         "signed_square": square,
         "rest_square": _mean(np.array([s.rest_square for s in stairs])),
@@ -180,5 +210,11 @@ def compute_jaggies_str(signals: Signals) -> Score:
             for x, s in zip(long, stairs, strict=True)
             if x.frame == signals.frame_start
         ],
+        "visible": {
+            "value": signed_root(_mean(np.array([s.visible_square for s in stairs]))),
+            "ppd": PPD,
+            "sensitivity": "Mannos and Sakrison 1974",
+        },
+        "crawl": crawl_of_edges(long, floor),
     }
-    return settle(signed_root(square), extras, floor=signals.floor * max(x.window.rows for x in long))
+    return settle(signed_root(square), extras, floor=floor)

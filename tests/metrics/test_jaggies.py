@@ -7,6 +7,7 @@ import pytest
 from scipy import special
 
 from aliasbench.metrics.catalog import measure
+from aliasbench.metrics.jaggies import contrast_sensitivity
 from aliasbench.scenes.model import Animation, Facts, Motion, Spin, Surface
 
 GOLDEN = (math.sqrt(5) - 1) / 2
@@ -82,6 +83,10 @@ def test_stairs_of_slope_one_half_are_counted_once(edge_scene, rgb, box_edge, po
     assert got["jaggies_str"].value == pytest.approx(0.25, abs=1e-9)
     assert got["jaggies_str"].value == pytest.approx(got["jaggies"].value, abs=1e-9)
     assert got["jaggies_str"].extras["edges"][0]["rank"] == 1
+    # Harmonics of two pixels' stairs are all the same wave, or none: a sum over them is too much.
+    harmonics = np.array(got["jaggies_str"].extras["harmonics"])
+    assert math.sqrt(2 * harmonics[0] ** 2) == pytest.approx(0.353553, abs=1e-6)
+    assert math.sqrt(2 * np.sum(harmonics**2)) == pytest.approx(0.707, abs=2e-4)
 
 
 @pytest.mark.parametrize(("n", "expected"), [(2, 0.144338), (4, 0.072169)])
@@ -113,6 +118,24 @@ def test_random_samples_make_white_noise_and_no_stairs(edge_scene, rgb, box_edge
     alone = measure("jaggies_str", rgb(test[0]), rgb(truth)[None], scene=scene)
     assert alone.extras["noise_from"] == "residual"
     assert abs(alone.extras["signed_square"]) < 5 * math.sqrt(32) / 400 / (6 * samples)
+
+
+@pytest.mark.parametrize("slope", [0.1 * GOLDEN, -0.3 * GOLDEN, GOLDEN, 0.5, 1.0])
+def test_box_pictures_put_the_edge_where_it_is(box_edge, slope):
+    # In the definition r compares two pictures; against the line itself the sum down a column of coverage is exact.
+    size, intercept = (100, 160), 20.3 + 100 * max(-slope, 0.0)
+    where = box_edge(size, slope, intercept).sum(axis=0)
+    assert np.abs(where - (slope * (np.arange(size[0]) + 0.5) + intercept)).max() < 1e-10
+
+
+@pytest.mark.parametrize("slope", [0.1 * GOLDEN, 0.3, 0.5, 1.0])
+@pytest.mark.parametrize("offset", [0.0, 0.25, 0.7])
+def test_one_sample_is_displaced_by_at_most_half_a_row(edge_scene, rgb, box_edge, point_edge, slope, offset):
+    size = (200, 40 + round(200 * slope))
+    args = (size, slope, 20.0 + offset)
+    got = scores(point_edge(*args), box_edge(*args), edge_scene(slope, 20.0 + offset, size), rgb)
+    assert 0.0 <= got["jaggies_rms"].value <= 0.5 + 1e-9
+    assert abs(got["jaggies_bias"].value) <= got["jaggies_rms"].value + 1e-12
 
 
 def test_exact_pictures_of_another_unit_filter_put_the_edge_in_the_same_place(edge_scene, rgb, box_edge):
@@ -256,3 +279,38 @@ def test_a_reference_that_is_not_good_enough_is_said(edge_scene, rgb, box_edge, 
     assert (poor["jaggies"].value, poor["jaggies"].status) == (None, "below_reference_floor")
     good = scores(test, truth, scene, rgb, reference_uncertainty=1e-3)
     assert good["jaggies"].status == "ok"
+
+
+def test_sensitivity_is_mannos_and_sakrisons():
+    f = np.linspace(0.0, 60.0, 60_001)
+    published = 2.6 * (0.0192 + 0.114 * f) * np.exp(-((0.114 * f) ** 1.1))
+    assert f[np.argmax(published)] == pytest.approx(8.0, abs=0.2)
+    assert published.max() == pytest.approx(0.98, abs=2e-3)
+    assert np.abs(contrast_sensitivity(f) - published / published.max()).max() < 1e-7
+
+
+@pytest.mark.parametrize("k", [1, 2, 5])
+def test_a_harmonic_is_seen_by_the_sensitivity_at_its_frequency(edge_scene, rgb, k):
+    slope, intercept, amplitude = 0.1 * GOLDEN, 20.3, 0.2
+    truth = np.zeros((SIZE[1], SIZE[0]))
+    test = truth.copy()
+    columns = np.arange(SIZE[0])
+    line_at = slope * (columns + 0.5) + intercept
+    test[np.floor(line_at).astype(int), columns] = amplitude * np.cos(2 * np.pi * k * line_at)
+    visible = scores(test, truth, edge_scene(slope, intercept), rgb)["jaggies_str"].extras["visible"]
+    assert (visible["ppd"], visible["sensitivity"]) == (60.0, "Mannos and Sakrison 1974")
+    cycles = k * slope / math.hypot(1, slope) * 60.0
+    # 32 stairs and a part of one: the mean square of the harmonic, its mean, which is taken off, and what it shows of
+    # its neighbours, 1 / (pi 32) of the amplitude, squared, of sensitivities up to 1.
+    assert visible["value"] == pytest.approx(
+        amplitude / math.sqrt(2) * float(contrast_sensitivity(np.array(cycles))), rel=1 / 64
+    )
+
+
+def test_visible_stairs_of_coinciding_harmonics_are_counted_once(edge_scene, rgb, box_edge, point_edge):
+    size = (130, 100)
+    got = scores(point_edge(size, 0.5, 10.125), box_edge(size, 0.5, 10.125), edge_scene(0.5, 10.125, size), rgb)
+    # One wave, which is harmonics 1, 3, 5 and 7: it is seen by their mean sensitivity, of squares.
+    cycles = np.array([1, 3, 5, 7]) * 0.5 / math.hypot(1, 0.5) * 60.0
+    expected = 0.25 * math.sqrt(np.mean(contrast_sensitivity(cycles) ** 2))
+    assert got["jaggies_str"].extras["visible"]["value"] == pytest.approx(expected, rel=1e-6)
