@@ -9,7 +9,19 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from aliasbench.metrics import bias, error, jaggies, moire, perceptual, shimmer, strobing, structure, video_quality
+from aliasbench.metrics import (
+    bias,
+    error,
+    jaggies,
+    moire,
+    mtf,
+    perceptual,
+    sharpness,
+    shimmer,
+    strobing,
+    structure,
+    video_quality,
+)
 from aliasbench.metrics.gate import Signals, open_gate
 from aliasbench.metrics.score import Metric, Score, finish
 from aliasbench.scenes.errors import NotAvailableError, unknown_name
@@ -18,6 +30,7 @@ from aliasbench.scenes.model import Scene
 _WANG = "Wang, Bovik, Sheikh, Simoncelli 2004"
 _BURNS = "area locator of a known edge; after Burns 2006, ISO/IEC 24790"
 _ANDERSSON = "Andersson et al. 2020, for bright scenes 2021; OpenImageIO"
+_ESFR = "slanted edge of known angle; after ISO 12233"
 _WATSON = "angular harmonics; after Watson, Ahumada, Farrell 1986"
 _SPLIT = "unbiased split over seeds; after Durand 2011, Subr and Kautz 2013"
 
@@ -131,6 +144,8 @@ METRICS: Mapping[str, Metric] = {
             structure.compute_structure,
             _SPLIT,
         ),
+        Metric("mtf50", "MTF50", "cycles/px", "higher", ("edges",), mtf.compute_mtf50, _ESFR),
+        Metric("edge_width", "edge width (10-90 %)", "px", "lower", ("edges",), sharpness.compute_edge_width, _ESFR),
         Metric("bias", "bias", "contrast", "zero", ("reference", "seeds"), bias.compute_bias, "Kirk and Arvo 1991"),
     )
 }
@@ -152,7 +167,7 @@ OPTIONAL: Mapping[str, Metric] = {
 }
 
 # Documented, defined, and not in this version.
-PLANNED = ("edge_width", "mtf50")
+PLANNED: tuple[str, ...] = ()
 
 
 def find_metric(name: str) -> Metric:

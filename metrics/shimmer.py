@@ -10,7 +10,8 @@ from scipy import fft
 
 from aliasbench.metrics.gate import Signals
 from aliasbench.metrics.score import Score, rms, settle
-from aliasbench.scenes.model import PanFact
+from aliasbench.metrics.sharpness import sharpness
+from aliasbench.scenes.model import FloatArray, PanFact
 from aliasbench.scenes.projection import view_at
 
 # Below this there is no shimmer whose character could be described.
@@ -75,7 +76,18 @@ def compute_shimmer_abs(signals: Signals) -> Score:
         sequence = (sequence - np.mean(sequence, axis=1, keepdims=True)) * window[:, None, None]
     spectrum = fft.fft(sequence, axis=1)[:, beyond] / signals.frames
     value = rms(np.abs(spectrum)) * np.sqrt(np.count_nonzero(beyond))
-    return Score(float(value), "ok" if whole else "windowed", extras)
+    kept = {**sharpness(signals), "in_band": in_band_contrast(signals.test, float(value))}
+    return Score(float(value), "ok" if whole else "windowed", {**extras, "sharpness": kept})
+
+
+def in_band_contrast(sequence: FloatArray, beyond: float) -> float:
+    """Return the RMS contrast about the mean of what a sequence holds besides the RMS `beyond` of what is folded."""
+    size = rms(sequence)
+    if size == 0.0:
+        return 0.0
+    # By Parseval, and scaled so that nothing overflows.
+    share = 1.0 - (float(np.mean(sequence)) / size) ** 2 - (beyond / size) ** 2
+    return size * float(np.sqrt(max(share, 0.0)))
 
 
 def compute_flux_flicker(signals: Signals) -> Score:

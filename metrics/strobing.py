@@ -14,6 +14,7 @@ import numpy as np
 from aliasbench.metrics.gate import Signals
 from aliasbench.metrics.orders import Orders, is_aliased, measure_orders, noise_power, sharp_power
 from aliasbench.metrics.score import Score, rms, settle
+from aliasbench.metrics.sharpness import sharpness
 from aliasbench.scenes.model import FloatArray
 
 # Below this share of the duty an order is not there, and has no rate.
@@ -46,12 +47,15 @@ def strobe_share(orders: Orders, fps: float) -> tuple[float, dict[str, object]]:
     tail = 2.0 * float(np.sum(sharp_power(rotor, series[unmeasured]))) + beyond
     measured = 2.0 * float(np.sum(power[aliased]))
     share = float(np.clip((measured + kept * tail) / total, 0.0, 1.0))
+    # All orders alike, aliased or not: what is left of the pattern at all.
+    left = 2.0 * float(np.sum(power)) + kept * (total - 2.0 * float(np.sum(sharp)))
     extras: dict[str, object] = {
         "highest_order": int(k.size) * rotor.blades,
         "measured_share": measured / total,
         "tail_share": tail / total,
         "tail_kept": kept,
         "noise_power": noise,
+        "modulation_kept": float(np.clip(left / total, 0.0, 1.0)),
     }
     return share, extras
 
@@ -72,12 +76,16 @@ def _measure_all(signals: Signals, picture: FloatArray) -> list[Orders] | Score:
 
 
 def compute_strobing(signals: Signals) -> Score:
-    """Return STROBE_abs in [0, 1]: the root of the visible aliased share; quadratic mean over rotors."""
+    """Return STROBE_abs in [0, 1]: the root of the visible aliased share; quadratic mean over rotors.
+
+    Extras: the sharpness, with the share of the sharp pattern's power that is left (the mean over rotors).
+    """
     rotors = _all_orders(signals, "test")
     if isinstance(rotors, Score):
         return rotors
     shares, extras = zip(*(strobe_share(o, signals.scene.animation.fps) for o in rotors), strict=True)
-    return Score(rms(np.sqrt(np.array(shares))), "ok", {"rotors": list(extras)})
+    kept = {**sharpness(signals), "modulation_kept": np.mean([e["modulation_kept"] for e in extras])}
+    return Score(rms(np.sqrt(np.array(shares))), "ok", {"rotors": list(extras), "sharpness": kept})
 
 
 def compute_strobing_err(signals: Signals) -> Score:

@@ -55,9 +55,10 @@ def full_scene(make_scene, edge_fact) -> Scene:
 
 @pytest.fixture(scope="module")
 def pictures():
-    """(seeds, frames, h, w, 3) and its reference, as rough as pictures get within [0, 1]."""
+    """(seeds, frames, h, w, 3) and its reference, as rough as pictures get within [0, 1] about the scene's edge."""
     rng = np.random.default_rng(0)
-    reference = rng.uniform(size=(FRAMES, SIDE, SIDE, 3))
+    above = 20.3 + 6.6 / 89 * (np.arange(SIDE) + 9.5) - (np.arange(SIDE)[:, None] + 0.5)
+    reference = 0.6 * np.clip(above + 0.5, 0.0, 1.0)[..., None] + 0.4 * rng.uniform(size=(FRAMES, SIDE, SIDE, 3))
     return np.clip(reference + 0.1 * rng.normal(size=(SEEDS, *reference.shape)), 0.0, 1.0), reference
 
 
