@@ -31,12 +31,13 @@ class Score:
     value : float or None
         Finite, or None.
     status : str
-        ``ok``, ``windowed`` (a value, but not of a whole loop), ``deterministic`` (a value without an interval), or the
-        reason for None: ``identical``, ``nonfinite``, ``overflow``, ``undefined_zero_contrast``,
-        ``undefined_one_frame``, ``undefined_too_small``, ``undefined_no_shimmer``, ``undefined_zero_flux``,
-        ``undefined_no_modulation``, ``undefined_uniform_error``, ``undefined_too_few_phases``, ``undefined_no_edge``,
-        ``undefined_no_crossing``, ``below_resolution``, ``not_applicable``, ``needs_seeds``, ``edge_leaves_window``,
-        ``annulus_leaves_window``, ``below_reference_floor``, ``not_installed`` (extras say how to).
+        ``ok``, ``windowed`` (a value, but not of a whole loop), ``deterministic`` (a value without an interval),
+        ``extrapolated`` (a value beyond what was measured), or the reason for None: ``identical``, ``nonfinite``,
+        ``overflow``, ``undefined_zero_contrast``, ``undefined_one_frame``, ``undefined_one_count``,
+        ``undefined_too_small``, ``undefined_no_shimmer``, ``undefined_zero_flux``, ``undefined_no_modulation``,
+        ``undefined_uniform_error``, ``undefined_too_few_phases``, ``undefined_no_edge``, ``undefined_no_crossing``,
+        ``below_resolution``, ``not_applicable``, ``needs_seeds``, ``edge_leaves_window``, ``annulus_leaves_window``,
+        ``out_of_reach``, ``below_reference_floor``, ``not_installed`` (extras say how to).
     extras : mapping
         Further figures and what they depend on; JSON serialisable.
     """
