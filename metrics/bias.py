@@ -9,6 +9,7 @@ seeds and none counts pixels.
 """
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import special
 
 from aliasbench.metrics.gate import Signals
@@ -89,7 +90,7 @@ def compute_bias(signals: Signals) -> Score:
     return settle(float(np.mean(error)), extras, floor=signals.floor, status="deterministic" if same else "ok")
 
 
-def _sum_by_coverage(signals: Signals) -> tuple[FloatArray, FloatArray, FloatArray, float, int]:
+def _sum_by_coverage(signals: Signals) -> tuple[FloatArray, FloatArray, NDArray[np.int64], float, int]:
     """Return sums by seed and tenth of the coverage, frame by frame, since all frames at once are gigabytes.
 
     They are, of the errors and of their squared deviations from the seeds' mean, (seeds, bins) each; the number of

@@ -20,14 +20,16 @@ SSIM_SIGMA = 1.5
 
 
 def compute_rmse(signals: Signals) -> Score:
-    """Return the root mean square of the luminance error; extras hold the three channels' own."""
+    """Return the root mean square of the luminance error; extras hold the three channels' own, and each seed's."""
 
     def squares(frame: int) -> FloatArray:
         difference = signals.test_rgb[:, frame] - signals.reference_rgb[frame].astype(np.float64, copy=False)
         return np.array([rms(difference[..., channel]) for channel in range(3)]) / signals.scene.contrast
 
     channels = np.stack(each_frame(squares, signals.frames))
-    extras = {"rgb": [rms(channels[:, channel]) for channel in range(3)]}
+    extras: dict[str, object] = {"rgb": [rms(channels[:, channel]) for channel in range(3)]}
+    if signals.seeds > 1:
+        extras["by_seed"] = [rms(error) for error in signals.error]
     return settle(rms(signals.error), extras, floor=signals.floor)
 
 

@@ -19,6 +19,7 @@ from plotly.offline import get_plotlyjs
 from aliasbench.bench.whole_files import make_folder, write_files
 from aliasbench.bench.wording import certainty
 from aliasbench.reports import charts, tables
+from aliasbench.reports.convergence import convergence_sections
 from aliasbench.reports.figures import HEAT_HIGH, HEAT_LOW, heat_palette
 from aliasbench.reports.gallery import Gallery, make_galleries
 from aliasbench.reports.records import Record, Run, load_runs
@@ -90,7 +91,8 @@ def render_page(runs: Sequence[Run]) -> str:
     """Return the whole page as text."""
     records = [record for run in runs for record in run.records]
     labels = [run.label for run in runs]
-    scenes = _scene_sections(records, labels)
+    groups = _by_scene(records)
+    scenes = _scene_sections(groups, labels)
     resources = files("aliasbench.reports")
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("aliasbench.reports", "templates"),
@@ -109,6 +111,7 @@ def render_page(runs: Sequence[Run]) -> str:
         scenes=scenes,
         troubles=_troubles(records),
         overview=tables.overview_table(records) if records else None,
+        convergence=convergence_sections(groups),
         records=tables.record_table(records, labels),
         figures=[{"id": s.anchor, **s.figure} for s in scenes if s.figure],
         heat_colours=["#" + bytes(c).hex() for c in heat_palette()[::5]],
@@ -133,16 +136,21 @@ def _machine_facts(run: Run) -> dict[str, Any]:
     return {"label": run.label, "main": main or rest[:8], "rest": rest if main else rest[8:]}
 
 
-def _scene_sections(records: Sequence[Record], runs: Sequence[str]) -> list[SceneSection]:
+def _by_scene(records: Sequence[Record]) -> list[tuple[str, list[Record]]]:
+    """Return the records of each scene and size under the scene's name, with the size where it has several."""
     groups: dict[tuple[str, tuple[int, int]], list[Record]] = {}
     for record in records:
         groups.setdefault((record.scene, record.size), []).append(record)
-    galleries = make_galleries(list(groups.values()), runs)
     names = [scene for scene, _ in groups]
-    links = [scene if names.count(scene) == 1 else f"{scene} {tables.size_text(size)}" for scene, size in groups]
+    titles = [scene if names.count(scene) == 1 else f"{scene} {tables.size_text(size)}" for scene, size in groups]
+    return list(zip(titles, groups.values(), strict=True))
+
+
+def _scene_sections(groups: Sequence[tuple[str, Sequence[Record]]], runs: Sequence[str]) -> list[SceneSection]:
+    galleries = make_galleries([group for _, group in groups], runs)
     return [
-        _scene_section(f"scene-{number}", links[number - 1], group, gallery, runs)
-        for number, (group, gallery) in enumerate(zip(groups.values(), galleries, strict=True), 1)
+        _scene_section(f"scene-{number}", link, group, gallery, runs)
+        for number, ((link, group), gallery) in enumerate(zip(groups, galleries, strict=True), 1)
     ]
 
 

@@ -48,7 +48,8 @@ class Score:
 class Record:
     """One case of one run; `run` is the label of the run, `folder` where its image files are.
 
-    `timing` is None where nothing was timed; times are in seconds. `uncertainty` is the reference's, None if unknown.
+    `timing` is None where nothing was timed; times are in seconds, and `seconds` the raw ones, round after round.
+    `uncertainty` is the reference's, None if unknown.
     """
 
     run: str
@@ -67,6 +68,7 @@ class Record:
     metrics: Mapping[str, Score] = field(default_factory=dict)
     uncertainty: float | None = None
     uncertainty_kind: str | None = None
+    seconds: tuple[float, ...] = ()
 
     @property
     def renderer(self) -> str:
@@ -160,6 +162,7 @@ def _read_record(r: Mapping[str, Any], folder: Path, label: str) -> Record:
         metrics={str(name): _read_score(score) for name, score in (r.get("metrics") or {}).items()},
         uncertainty=_finite(r.get("uncertainty")),
         uncertainty_kind=r.get("uncertainty_kind"),
+        seconds=tuple(seconds),
     )
 
 

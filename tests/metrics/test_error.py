@@ -121,6 +121,15 @@ def test_rmse_is_of_luminance_and_keeps_the_channels_beside_it(make_scene, rgb):
     assert score.extras["rgb"] == [0.0, 0.5, 0.0]
 
 
+def test_rmse_of_several_seeds_keeps_each_of_theirs(make_scene, rgb):
+    test = np.random.default_rng(2).normal(size=(3, 2, 8, 8))
+    score = measure("rmse", rgb(test), rgb(np.zeros((2, 8, 8))), scene=make_scene((8, 8)), filter_radius_px=0)
+    assert score.extras["by_seed"] == pytest.approx(np.sqrt((test**2).mean(axis=(1, 2, 3))), rel=1e-12)
+    assert score.value == pytest.approx(math.sqrt(np.mean(np.square(score.extras["by_seed"]))), rel=1e-12)
+    one = measure("rmse", rgb(test[0]), rgb(np.zeros((2, 8, 8))), scene=make_scene((8, 8)))
+    assert "by_seed" not in one.extras
+
+
 def test_ssim_is_one_for_equal_pictures_and_falls_with_noise(make_scene, rgb):
     scene = make_scene((24, 24))
     truth = np.indices((1, 24, 24)).sum(axis=0) % 7 / 6.0
