@@ -134,6 +134,8 @@ def _build() -> tuple[Parser, dict[str, Parser]]:
     section = commands["list"]
     section.add_argument("section", nargs="?", metavar="SECTION", help="only this one")
     section.add_argument("name", nargs="?", metavar="NAME", help="all there is to know of this one")
+    page = "of metrics: a page of what they mean, with pictures, goes here"
+    section.add_argument("-o", "--output", type=read_path, metavar="DIR", help=page)
     _add_json(section)
     _add_render(commands["render"])
     _add_run(commands["run"])

@@ -118,6 +118,8 @@ def _list(options: argparse.Namespace) -> int:
         if options.name not in by_name:
             raise unknown_name(f"name of {options.section}", options.name, by_name)
         rows = {options.section: [by_name[options.name]]}
+    if options.output is not None:
+        return _list_as_page(options)
     if options.json:
         _print_json(rows)
     else:
@@ -126,6 +128,21 @@ def _list(options: argparse.Namespace) -> int:
                 "\n".join(describe(section, found, whole=options.name is not None)) for section, found in rows.items()
             )
         )
+    return OK
+
+
+def _list_as_page(options: argparse.Namespace) -> int:
+    if options.section != "metrics":
+        raise InputError("list -o: only metrics have a page; of scenes: aliasbench scenes sheet -o DIR")
+    from aliasbench.reports.guide_page import write_guide
+
+    names = [options.name] if options.name else []
+    page, sections = write_guide(options.output, names, on_step=lambda line: _tell(printable(line)))
+    if options.json:
+        scores = {s.metric.name: [shot.as_data() for shot in s.shots] for s in sections}
+        _print_json({"page": str(page), "metrics": scores})
+    else:
+        _say(printable(str(page)))
     return OK
 
 

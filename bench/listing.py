@@ -1,11 +1,13 @@
 """What there is to name on the command line and in suites, with a line on each: read from the registries."""
 
+import textwrap
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, is_dataclass
 
 from aliasbench.bench.suite_file import SUITES
 
 Rows = list[dict[str, object]]
+WIDTH = 100  # characters of a line of running text
 
 
 def _scenes() -> Rows:
@@ -40,6 +42,7 @@ def _filters() -> Rows:
 
 def _metrics() -> Rows:
     from aliasbench.metrics.catalog import METRICS, OPTIONAL
+    from aliasbench.metrics.guide import GUIDE
     from aliasbench.metrics.score import Metric
 
     def summary(m: Metric) -> str:
@@ -48,7 +51,13 @@ def _metrics() -> Rows:
         )
 
     return [
-        {"name": m.name, "summary": summary(m), "unit": m.unit, "better": m.better}
+        {
+            "name": m.name,
+            "summary": summary(m),
+            "unit": m.unit,
+            "better": m.better,
+            "guide": {**asdict(GUIDE[m.name]), "needs": ", ".join(m.needs), "source": m.source},
+        }
         for m in (*METRICS.values(), *OPTIONAL.values())
     ]
 
@@ -66,6 +75,11 @@ SECTIONS: Mapping[str, Callable[[], Rows]] = {
     "suites": _suites,
 }
 
+MORE: Mapping[str, str] = {
+    "scenes": "parameters: aliasbench list scenes NAME",
+    "metrics": "what one means: aliasbench list metrics NAME; all with pictures: aliasbench list metrics -o DIR",
+}
+
 
 def _plain(parameter: object) -> object:
     if is_dataclass(parameter) and not isinstance(parameter, type):
@@ -74,7 +88,7 @@ def _plain(parameter: object) -> object:
 
 
 def describe(section: str, rows: Rows, *, whole: bool = False) -> list[str]:
-    """Return a section as lines for people, one for each name; with `whole`, scenes with their parameters."""
+    """Return a section as lines for people, one for each name; with `whole`, all there is to know of each."""
     width = max((len(str(row["name"])) for row in rows), default=0)
     lines = [f"{section}:"]
     for row in rows:
@@ -83,6 +97,26 @@ def describe(section: str, rows: Rows, *, whole: bool = False) -> list[str]:
         for name, p in parameters.items() if whole and isinstance(parameters, dict) else ():
             allowed = " or ".join(p["names"]) if "names" in p else f"{p['low']:.10g} to {p['high']:.10g}"
             lines.append(f"    {name}={p['default']}: {p['meaning']} ({allowed})")
-    if section == "scenes" and not whole:
-        lines.append("  (parameters: aliasbench list scenes NAME)")
+        guide = row.get("guide")
+        if whole and isinstance(guide, dict):
+            lines += _guide_lines(guide)
+    if section in MORE and not whole:
+        lines.append(f"  ({MORE[section]})")
+    return lines
+
+
+def _guide_lines(guide: Mapping[str, object]) -> list[str]:
+    """Return what is to know of a metric: headings on the left, wrapped texts beside them."""
+    heads = {key: f"    {key.replace('_', ' ')}:" for key in guide}
+    width = max(map(len, heads.values())) + 2
+    lines = []
+    for key, text in guide.items():
+        lines += textwrap.wrap(
+            str(text),
+            WIDTH,
+            initial_indent=heads[key].ljust(width),
+            subsequent_indent=" " * width,
+            break_long_words=False,
+            break_on_hyphens=False,
+        )
     return lines

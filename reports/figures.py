@@ -6,6 +6,7 @@ our own because OpenImageIO writes neither to memory nor palettes, and palettes 
 """
 
 import base64
+import io
 import struct
 import zlib
 from collections.abc import Sequence
@@ -51,10 +52,25 @@ def encode_picture(image: FloatImage, exposure: float = 1.0) -> Picture:
     exposure : float
         Factor before clipping.
     """
+    levels = _display_levels(image, exposure)
+    return _picture(png_bytes(levels), levels)
+
+
+def _display_levels(image: FloatImage, exposure: float) -> Bytes:
+    """Return (..., h, w, 3) radiance as sRGB bytes, of one channel where all are the same."""
     linear = np.clip(np.nan_to_num(image * exposure, posinf=1.0, neginf=0.0), 0.0, 1.0)
-    levels = np.rint(linear_to_srgb(np.asarray(linear, np.float64)) * 255.0).astype(np.uint8)
-    grey = bool(np.all(levels == levels[..., :1]))
-    return _picture(png_bytes(levels[..., 0] if grey else levels), levels)
+    levels: Bytes = np.rint(linear_to_srgb(np.asarray(linear, np.float64)) * 255.0).astype(np.uint8)
+    return levels[..., 0] if np.all(levels == levels[..., :1]) else levels
+
+
+def encode_film(images: FloatImage, frame_ms: int, exposure: float = 1.0) -> Picture:
+    """Return (frames, h, w, 3) linear radiance as an animated PNG that loops, displayed as by `encode_picture`."""
+    from PIL import Image
+
+    first, *rest = (Image.fromarray(levels) for levels in _display_levels(images, exposure))
+    out = io.BytesIO()
+    first.save(out, "PNG", save_all=True, append_images=rest, duration=frame_ms, loop=0)
+    return _picture(out.getvalue(), np.asarray(first))
 
 
 def heat_levels(test: FloatImage, reference: FloatImage, contrast: float) -> Bytes:

@@ -4,7 +4,6 @@ Everything is inside the one file (pictures, the chart library, style and script
 as a build artifact and opened from a disk. This module gathers; figures, charts and tables decide; the template draws.
 """
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -12,8 +11,6 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-import jinja2
-from markupsafe import Markup, escape
 from plotly.offline import get_plotlyjs
 
 from aliasbench.bench.whole_files import make_folder, write_files
@@ -22,6 +19,7 @@ from aliasbench.reports import charts, tables
 from aliasbench.reports.convergence import convergence_sections
 from aliasbench.reports.figures import HEAT_HIGH, HEAT_LOW, heat_palette
 from aliasbench.reports.gallery import Gallery, make_galleries
+from aliasbench.reports.markup import make_environment
 from aliasbench.reports.records import Record, Run, load_runs
 from aliasbench.reports.signal_figures import SignalFigure, draw_records
 
@@ -82,11 +80,6 @@ def write_report(run_dirs: Sequence[Path], out: Path) -> Path:
     return page
 
 
-def _breakable(text: str) -> Markup:
-    """Return text that may wrap after a colon or a comma, where names have their joints."""
-    return Markup(re.sub(r"([:,])", r"\1<wbr>", str(escape(text))))
-
-
 def render_page(runs: Sequence[Run]) -> str:
     """Return the whole page as text."""
     records = [record for run in runs for record in run.records]
@@ -94,31 +87,28 @@ def render_page(runs: Sequence[Run]) -> str:
     groups = _by_scene(records)
     scenes = _scene_sections(groups, labels)
     resources = files("aliasbench.reports")
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("aliasbench.reports", "templates"),
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        undefined=jinja2.StrictUndefined,
-    )
-    environment.filters["breakable"] = _breakable
-    return environment.get_template("page.html.j2").render(
-        runs=runs,
-        machines=[_machine_facts(run) for run in runs if run.machine],
-        suites=", ".join(dict.fromkeys(run.suite for run in runs if run.suite)),
-        dates=_dates(runs),
-        counts=tables.status_counts(records),
-        scenes=scenes,
-        troubles=_troubles(records),
-        overview=tables.overview_table(records) if records else None,
-        convergence=convergence_sections(groups),
-        records=tables.record_table(records, labels),
-        figures=[{"id": s.anchor, **s.figure} for s in scenes if s.figure],
-        heat_colours=["#" + bytes(c).hex() for c in heat_palette()[::5]],
-        heat_ticks=_heat_ticks(),
-        style=(resources / "style.css").read_text(encoding="utf-8"),
-        viewer=(resources / "viewer.js").read_text(encoding="utf-8"),
-        plotly=get_plotlyjs() if any(s.figure for s in scenes) else "",
+    return (
+        make_environment()
+        .get_template("page.html.j2")
+        .render(
+            runs=runs,
+            machines=[_machine_facts(run) for run in runs if run.machine],
+            suites=", ".join(dict.fromkeys(run.suite for run in runs if run.suite)),
+            dates=_dates(runs),
+            counts=tables.status_counts(records),
+            scenes=scenes,
+            troubles=_troubles(records),
+            overview=tables.overview_table(records) if records else None,
+            convergence=convergence_sections(groups),
+            records=tables.record_table(records, labels),
+            meanings=tables.column_meanings(records),
+            figures=[{"id": s.anchor, **s.figure} for s in scenes if s.figure],
+            heat_colours=["#" + bytes(c).hex() for c in heat_palette()[::5]],
+            heat_ticks=_heat_ticks(),
+            style=(resources / "style.css").read_text(encoding="utf-8"),
+            viewer=(resources / "viewer.js").read_text(encoding="utf-8"),
+            plotly=get_plotlyjs() if any(s.figure for s in scenes) else "",
+        )
     )
 
 

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from aliasbench.metrics.catalog import METRICS, OPTIONAL
+from aliasbench.metrics.guide import GUIDE
 from aliasbench.reports.charts import RENDERER_NAMES, number
 from aliasbench.reports.records import Record, Score
 
@@ -168,7 +169,14 @@ def _metric_heading(name: str) -> Heading:
     arrow = {"low": " ↓", "hig": " ↑"}.get(str(entry.better)[:3], "")
     better = {"low": ", lower is better", "hig": ", higher is better"}.get(str(entry.better)[:3], "")
     unit = "" if entry.unit in ("", "1") else entry.unit
-    return Heading(f"{entry.label}{arrow}", f"{name}{better}; {entry.source}", True, unit)
+    meaning = GUIDE[name].meaning
+    title = f"{name}{better}; {meaning[0].lower()}{meaning[1:]} Source: {entry.source}"
+    return Heading(f"{entry.label}{arrow}", title, True, unit)
+
+
+def column_meanings(records: Sequence[Record]) -> list[tuple[str, str]]:
+    """Return label and meaning of every metric that any record has."""
+    return [(METRICS[name].label, GUIDE[name].meaning) for name in _present(records, METRICS) if name in METRICS]
 
 
 def _best(name: str, records: Sequence[Record]) -> float | None:

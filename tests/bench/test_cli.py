@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,9 @@ import pytest
 from aliasbench.bench import doctor
 from aliasbench.bench.arguments import COMMANDS, NOT_YET
 from aliasbench.bench.frames import read_image
-from aliasbench.bench.listing import SECTIONS
+from aliasbench.bench.listing import SECTIONS, WIDTH
+from aliasbench.metrics.catalog import METRICS
+from aliasbench.metrics.guide import GUIDE
 from aliasbench.renderers.raster.context import ContextReport
 from aliasbench.renderers.raytrace.embree import EmbreeInfo
 from aliasbench.renderers.technique import parse_technique
@@ -60,6 +63,10 @@ def assert_refused(result: tuple[int, str, str], sentence: str) -> None:
         ("render propeller raytrace: -o OUT.exr --frames 3", "unknown option of aliasbench render '--frames'"),
         ("render propeller raytrace: extra -o OUT.exr", "unexpected 'extra'"),
         ("list scene", "unknown section 'scene'; did you mean 'scenes'?"),
+        ("list metrics jagies", "unknown name of metrics 'jagies'; did you mean 'jaggies'?"),
+        ("list scenes -o OUT", "list -o: only metrics have a page; of scenes: aliasbench scenes sheet -o DIR"),
+        ("list -o OUT", "list -o: only metrics have a page"),
+        ("list metrics -o", "--output needs a value, --output DIR (see"),
         ("run -o OUT", "nothing to run: name a suite, or scenes with --scene"),
         ("run quik -o OUT", "unknown suite 'quik'; did you mean 'quick'?"),
         ("run quick", "required: -o/--output"),
@@ -221,6 +228,20 @@ def test_list_names_every_entry_and_its_json_is_the_same(run: Run, section: str)
     rows = json.loads(run("list", section, "--json")[1])[section]
     assert len(rows) > 0
     assert all(row["name"] in text for row in rows)
+
+
+@pytest.mark.parametrize("name", METRICS)
+def test_a_metric_is_listed_with_its_guide_whole(run: Run, name: str) -> None:
+    code, text, err = run("list", "metrics", name)
+    assert (code, err) == (0, "")
+    assert max(map(len, text.splitlines())) <= WIDTH
+    words = " ".join(text.split())
+    (row,) = json.loads(run("list", "metrics", name, "--json")[1])["metrics"]
+    assert row["name"] == name
+    for field, told in asdict(GUIDE[name]).items():
+        assert f"{field.replace('_', ' ')}: {told}" in words
+        assert row["guide"][field] == told
+    assert f"source: {METRICS[name].source}" in words
 
 
 def test_list_alone_lists_everything(run: Run) -> None:

@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from aliasbench.metrics.catalog import METRICS
+from aliasbench.metrics.guide import GUIDE
 from aliasbench.reports.page import write_report
 from aliasbench.scenes.errors import InputError
 
@@ -79,6 +81,16 @@ def test_every_case_is_on_the_page_with_its_reason(typical: Path, tmp_path: Path
     for technique in ("raytrace:", "raytrace:spp=16,sampler=jittered", "raster:msaa=4", "raster:", "raster:ssaa=2"):
         # a tile, a row of the scene, a row of all records, a row of the overview
         assert page.words.count(technique) >= 4
+
+
+def test_the_page_says_what_its_columns_mean(typical: Path, fabricate: Fabricate, tmp_path: Path) -> None:
+    page = report([typical], tmp_path / "out")
+    for name in METRICS:
+        # of the metrics in the records of that run, and of no other
+        assert (GUIDE[name].meaning in page.text) == (name in ("rmse", "jaggies", "strobing"))
+    empty = report([fabricate([], "empty")], tmp_path / "none")
+    assert "What the columns mean" in page.text
+    assert "What the columns mean" not in empty.text
 
 
 def test_links_to_scenes_say_the_size_where_it_tells_them_apart(

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from playwright.sync_api import Page, sync_playwright
 
+from aliasbench.reports.guide_page import write_guide
+
 pytestmark = pytest.mark.browser
 
 FLAGS = [
@@ -134,6 +136,32 @@ def test_nothing_is_wider_than_the_window_and_the_theme_follows(opened: Opened) 
         title = "(t => t && getComputedStyle(t).fill)(document.querySelector('.chart .xtitle'))"
         ink.append(page.wait_for_function(title).json_value())
     assert ink[0] != ink[1]
+
+
+def test_the_guide_has_its_pairs_side_by_side_in_whole_pixels_on_any_width(opened: Opened, tmp_path: Path) -> None:
+    path, sections = write_guide(tmp_path, ["jaggies", "buzz"])
+    browser = opened.page.context.browser
+    assert browser is not None
+    page = browser.new_page(reduced_motion="reduce")
+    page.on("request", lambda r: opened.requests.append(r.url))
+    page.goto(path.as_uri())
+    for width in (390, 768, 1400):
+        page.set_viewport_size({"width": width, "height": 844})
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
+        for section in sections:
+            pictures = page.locator(f"#{section.metric.name} img")
+            boxes = [pictures.nth(k).bounding_box() for k in (0, 1)]
+            low, high = (box for box in boxes if box is not None)
+            assert low["y"] == high["y"]
+            assert low["x"] + low["width"] < high["x"]
+            assert section.pair is not None
+            for box in (low, high):
+                assert box["width"] == box["height"]
+                assert box["width"] % section.pair.side == 0
+                assert box["x"] + box["width"] <= width
+    shown = page.locator("#buzz img").first.evaluate("i => i.currentSrc")
+    assert shown == sections[1].shots[0].still.uri
+    page.close()
 
 
 def test_all_this_was_quiet_and_asked_nobody(opened: Opened) -> None:

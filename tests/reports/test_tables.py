@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from aliasbench.metrics.catalog import METRICS
+from aliasbench.metrics.guide import GUIDE
 from aliasbench.reports import tables
 from aliasbench.reports.records import Record, load_runs
 
@@ -35,6 +36,7 @@ def test_headings_come_from_the_registry(typical: Path) -> None:
     (heading,) = [h for h in table.headings if h.title.startswith("jaggies,")]
     assert (heading.text, heading.unit) == (f"{METRICS['jaggies'].label} ↓", "px")
     assert "lower is better" in heading.title
+    assert f"{GUIDE['jaggies'].meaning[1:]} Source: {METRICS['jaggies'].source}" in heading.title
 
 
 def test_the_best_of_each_column_is_marked_whichever_way_better_is(
