@@ -228,7 +228,7 @@ GUIDE: Mapping[str, Guide] = MappingProxyType(
             "MTF(MTF50) = ½, MTF = |Fourier transform of the slope of the edge's profile|",
             "A property of the filter: along the rows 0.603 with a box, 0.443 with a tent, 0.375 with a Gaussian of "
             "σ = 0.5 px.",
-            "No number: its MTF is 1 at all frequencies and never falls to a half.",
+            "No number, as its MTF is 1 at all frequencies: the status is undefined_no_crossing.",
             "More is not better by itself, as point sampling is the sharpest of all: read it beside shimmer_abs, "
             "strobing and moire.",
         ),
@@ -237,7 +237,7 @@ GUIDE: Mapping[str, Guide] = MappingProxyType(
             "distance across the edge between 10 % and 90 % of its profile, in pixels",
             "A property of the filter: along the rows 0.8 px with a box, 1.11 px with a tent, 1.28 px with a Gaussian "
             "of σ = 0.5 px.",
-            "Next to 0: the profile is a step.",
+            "No number, as the profile is a step: the status is below_resolution.",
             "Less is not better by itself, as point sampling has the steepest edges of all: read it beside jaggies and "
             "shimmer.",
         ),
@@ -275,23 +275,24 @@ GUIDE: Mapping[str, Guide] = MappingProxyType(
         "shutter": Guide(
             "How far the scene's own shutter is from one that is open for the whole frame: strobing that is meant.",
             "shutter = RMS( R_s − R_1 ) / C, both exact: the scene's shutter, and one open for a whole frame",
-            "The same for every technique.",
-            "The same for every technique.",
+            "The same for every technique of that filter.",
+            "The same for every technique of that filter.",
             "It belongs to the scene and ranks no renderer.",
         ),
         "apparent_velocity": Guide(
             "How fast a regular pattern seems to move, true or not, in pixels a frame along its frequency.",
-            "v_seen = wrap(ν v) / ν, wrapped into ±½ cycle a frame, of ν cycles a pixel that move by v px a frame",
+            "v_seen = wrap(ν v) / |wrap(ν)|, wrapped into ±½, for ν cycles a pixel that move by v px a frame",
             "The same as a point sampler: an exact picture has no other directions. Blur only makes them faint.",
             "−1 px a frame for a pattern of four pixels a period that moves by 3.",
             "Patterns finer than two pixels a period are seen as coarser ones, which move at speeds of their own.",
         ),
         "gaps": Guide(
-            "How many pixels of thin things are missing: nothing is drawn where the truth has something.",
-            "pixels a frame with R above a share of C and nothing in T",
+            "How many pixels of a frame are as dark as if nothing were there, where the truth stands out.",
+            "pixels a frame with R > R_min + C/8 and T < R_min + C/256, R_min the darkest of the frame",
             "Zero.",
-            "A share 1 − w of the pixels along a line w px wide: 0.9 of them at a width of 0.1 px.",
-            "It counts what is missing and not what is too bright, and a trace of light in a pixel is enough for it.",
+            "0.375 for every pixel along an edge, so 0.75 along a line, whatever its width from 1/8 px on.",
+            "It counts what is missing and not what is too bright, and a trace of light in a pixel is enough for it. "
+            "Stairs have gaps as well, where an edge covers less than half of a pixel.",
         ),
     }
 )

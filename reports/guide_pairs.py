@@ -45,6 +45,7 @@ class Pair:
 
 
 POINT, STRATIFIED = "raytrace:", "raytrace:spp=16"
+EXACT, WIDE = "reference:", "reference:filter=gaussian,sigma=1.5,radius=6"
 REAL_TIME_MS = 33
 
 
@@ -145,6 +146,44 @@ PAIRS: Mapping[str, Pair] = MappingProxyType(
             *_by("propeller:rev_per_s=8,shutter=1", STRATIFIED, "raytrace:spp=16,motion=matrix"),
             "Right, points move along chords, not arcs: blades shrink, and no number of samples brings the rim back.",
             seeds=8,
+        ),
+        "mtf50": Pair(
+            *_by("near-horizontal-edge:slope=0.2764", WIDE, EXACT),
+            "Both are exact, the left one with a filter many pixels wide.",
+        ),
+        "edge_width": Pair(
+            *_by("near-horizontal-edge:slope=0.2764", EXACT, WIDE),
+            "Both are exact, the right one with a filter many pixels wide.",
+        ),
+        "flip": Pair(
+            *_by("brick-floor", "raytrace:spp=64", POINT),
+            "Far bricks are an even tone on the left, and salt and pepper on the right.",
+        ),
+        "spatial": Pair(
+            *_by("propeller:rev_per_s=2,shutter=0.5", STRATIFIED, POINT),
+            "Whatever the motion, borders are smooth on the left and stairs on the right.",
+            frames=15,
+        ),
+        "temporal": Pair(
+            *_by("propeller:rev_per_s=2,shutter=1", STRATIFIED, "raytrace:spp=16,time=center"),
+            "The shutter is open for the whole frame. Right, nothing of the blur is drawn.",
+            frames=15,
+        ),
+        "shutter": Pair(
+            Shot("propeller:rev_per_s=2,shutter=0.9", STRATIFIED),
+            Shot("propeller:rev_per_s=2,shutter=0.1", STRATIFIED),
+            "Blades flow into each other on the left, and are seen one by one on the right.",
+            frames=15,
+        ),
+        "apparent_velocity": Pair(
+            Shot("grid:lines=155,speed=2", POINT),
+            Shot("grid:lines=10,speed=2", POINT),
+            "Both move to the right. The left one is finer than the pixels: a false grid moves to the left.",
+            frames=15,
+        ),
+        "gaps": Pair(
+            *_by("slivers:count=32,narrowest_px=0.2,widest_px=2", "raytrace:spp=64", POINT),
+            "Rays thinner than a pixel are whole on the left, and dots with gaps between them on the right.",
         ),
     }
 )

@@ -38,7 +38,6 @@ GIVEN: Mapping[str, set[str]] = {
     "edge_width": {"0.5"},
     # Between black and white, as published with the metric.
     "flip": {"0.967"},
-    "gaps": {"0.1"},
 }
 NU = 17 / 16  # lines a pixel
 GAUSS = 0.5  # pixels
@@ -104,6 +103,15 @@ def half_of(mtf: Callable[[float], float]) -> float:
     return float(optimize.brentq(lambda nu: mtf(nu) - 0.5, 0.01, 0.9))
 
 
+def gaps_of_line(width: float) -> float:
+    """Pixels with more than 1/8 of a line and a centre beside it, on average over the line's places."""
+    start = (np.arange(8000) + 0.5) / 8000
+    pixel = np.arange(-3, 4)[:, None]
+    covered = np.minimum(start + width, pixel + 1) - np.maximum(start, pixel)
+    hit = (start <= pixel + 0.5) & (pixel + 0.5 <= start + width)
+    return float(np.sum((covered > 1 / 8) & ~hit) / start.size)
+
+
 def bins_of_band(side: int) -> int:
     nu = np.hypot(*np.meshgrid(np.fft.fftfreq(side), np.fft.fftfreq(side)))
     return int(np.sum((nu > 0) & (nu <= 0.25)))
@@ -154,7 +162,9 @@ FIGURES: list[tuple[str, str, str, float]] = [
     ("edge_width", "perfect", "1.11", 2 * (1 - math.sqrt(0.2))),
     ("edge_width", "perfect", "1.28", 2 * GAUSS * math.sqrt(2) * optimize.brentq(lambda x: math.erf(x) - 0.8, 0, 3)),
     ("spatial", "point_sampled", "0.289", EDGE),
-    ("gaps", "point_sampled", "0.9", 1 - 0.1),
+    ("gaps", "point_sampled", "0.375", gaps_of_line(0.3) / 2),
+    ("gaps", "point_sampled", "0.75", gaps_of_line(0.3)),
+    ("gaps", "point_sampled", "0.75", gaps_of_line(0.9)),
 ]
 # Statements with a bound in place of a figure; each has a test of its own below.
 BOUNDS: Mapping[str, set[str]] = {"ssim": {"0.9"}, "shimmer": {"0.9"}, "moire": {"0.3", "0.7"}}
