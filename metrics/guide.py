@@ -15,7 +15,7 @@ NOTATION: Mapping[str, str] = MappingProxyType(
         "T, R": "luminance of the picture under test, and of the exact picture with the same pixel filter and shutter",
         "C": "contrast that the scene declares, white minus black: the unit of all errors",
         "E": "error (T − R) / C of a pixel; p counts pixels, t frames and s seeds",
-        "sinc x": "sin(πx) / (πx)",
+        "Ê, T̂, f": "Fourier transforms over the number of values; frames a second",
     }
 )
 
@@ -175,7 +175,7 @@ GUIDE: Mapping[str, Guide] = MappingProxyType(
         ),
         "strobing": Guide(
             "How much of a rotor's pattern is seen at a false speed: what is still visible of all that turns too fast "
-            "for the frame rate f.",
+            "for the frame rate.",
             "STROBE_abs = √( Σ |c_m|² / Σ |a_m|² ), above over orders m with |m r| ≥ f/2, below over all but 0; "
             "c_m of the picture, a_m of the sharp pattern, at r rev/s",
             "A property of the shutter, not 0: three blades at 29 rev/s and 30 frames a second score 1 at an instant, "
