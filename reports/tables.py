@@ -176,7 +176,8 @@ def _metric_heading(name: str) -> Heading:
 
 def column_meanings(records: Sequence[Record]) -> list[tuple[str, str]]:
     """Return label and meaning of every metric that any record has."""
-    return [(METRICS[name].label, GUIDE[name].meaning) for name in _present(records, METRICS) if name in METRICS]
+    known = {**METRICS, **OPTIONAL}
+    return [(known[name].label, GUIDE[name].meaning) for name in _present(records, METRICS) if name in known]
 
 
 def _best(name: str, records: Sequence[Record]) -> float | None:
