@@ -45,7 +45,7 @@ def test_a_grating_comes_back_at_the_difference_frequency(make_scene, rgb, nu, n
     assert [abs(f) for f in peak.extras["cycles_per_px"]] == [1 / 16, 0.0]
     assert peak.extras["period_px"] == 16.0
     assert peak.extras["fisher_g"] == pytest.approx(1.0)
-    assert peak.extras["p_value_bound"] < 1e-100
+    assert peak.extras["p_value"] < 1e-100
     score = measure("moire", test, truth, scene=scene, filter_radius_px=0.0)
     assert score.value == pytest.approx(expected / math.sqrt(2), abs=1e-7)
 
@@ -74,6 +74,9 @@ def test_a_known_grating_without_whole_periods_is_windowed(make_scene, rgb):
     score = measure("moire", test, truth, scene=scene)
     assert score.status == "windowed"
     assert score.value == pytest.approx((1 - np.sinc(nu)) / math.sqrt(2), rel=1e-3)
+    # Neighbouring bins share a window's lines: the exact test does not hold.
+    peak = measure("moire_peak", test, truth, scene=scene)
+    assert (peak.status, peak.extras["p_value"], peak.extras["p_value_any"]) == ("windowed", None, None)
 
 
 def test_at_nyquist_nothing_is_in_the_visible_band(make_scene, rgb):
@@ -102,7 +105,7 @@ def test_white_noise_puts_the_bands_share_into_moire(make_scene, rgb):
     # The largest of n exponentials is ln n, give or take 1 of about 7.
     assert peak.value == pytest.approx(2 * math.sqrt(math.log(bins / 2)) / W, rel=0.1)
     assert peak.value == pytest.approx(0.042, rel=0.1)
-    assert peak.extras["p_value_bound"] > 1e-3
+    assert peak.extras["p_value_any"] > 1e-3
 
 
 def test_noise_between_seeds_is_not_structured_moire(make_scene, rgb):
