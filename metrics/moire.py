@@ -8,9 +8,10 @@ lets through has no error; it is told beside it (`abs`), where the scene's spect
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from aliasbench.metrics.blocks import describe_blocks
-from aliasbench.metrics.blur_split import split_blur
+from aliasbench.metrics.blur_split import SMALLEST, split_blur
 from aliasbench.metrics.fisher import fisher_p_value
 from aliasbench.metrics.gate import Signals
 from aliasbench.metrics.score import Score, rms, settle, signed_root
@@ -45,8 +46,7 @@ def compute_moire(signals: Signals) -> Score:
     ordinates = inside.shape[-1]
     if not ordinates:
         return Score(None, "undefined_too_small", {"size": size})
-    # Two bins to each ordinate and two numbers to each bin: sum of |E|^2 = 2 n x 2 rms^2.
-    value = 2.0 * math.sqrt(ordinates) * rms(inside.view(np.float64))
+    value = band_rms(inside)
     extras: dict[str, object] = {
         "band_cycles_per_px": HIGHEST_VISIBLE,
         "bins": 2 * ordinates,
@@ -79,7 +79,7 @@ def compute_moire_peak(signals: Signals) -> Score:
     strongest = magnitude[seed, frame]
     largest = float(np.max(strongest))
     relative = strongest / largest if largest > 0.0 else strongest
-    share = float(relative @ relative)
+    share = float(np.sum(relative**2))
     extras: dict[str, object] = {"size": size, **describe_blocks(signals, np.sum(magnitude**2, axis=-1))}
     status = "windowed" if spectrum.windowed else "ok"
     if largest**2 * share < NOTHING:
@@ -105,6 +105,12 @@ def _describe_significance(g: float, ordinates: int, pictures: int, windowed: bo
     return {"ordinates": ordinates, "p_value": p, "p_value_any": any_picture}
 
 
+def band_rms(inside: NDArray[np.complex128]) -> float:
+    """Return sqrt(sum of |E|^2) of transforms (..., n) of which each ordinate stands for two bins; quadratic mean."""
+    # two numbers to each bin: the sum is 2 n x 2 rms^2
+    return 2.0 * math.sqrt(inside.shape[-1]) * rms(np.ascontiguousarray(inside).view(np.float64))
+
+
 def false_energy(signals: Signals) -> float | None:
     """Return M_abs: the RMS of what the picture itself has in the band at frequencies that its gratings do not have.
 
@@ -124,7 +130,7 @@ def false_energy(signals: Signals) -> float | None:
         return None
     frames = key_frames(signals.frames, MOST_FRAMES)
     inside = np.stack([transform(trim.apply(own[t]), band)[free] for own in signals.test for t in frames])
-    return 2.0 * math.sqrt(inside.shape[-1]) * rms(inside.view(np.float64))
+    return band_rms(inside)
 
 
 def key_frames(frames: int, most: int) -> list[int]:
@@ -135,8 +141,12 @@ def key_frames(frames: int, most: int) -> list[int]:
 
 def _describe_blur(signals: Signals) -> dict[str, object]:
     frames = key_frames(signals.frames, min(MOST_FRAMES, MOST_PIXELS // signals.error[:, 0].size))
-    reference = np.concatenate([signals.reference[frames]] * signals.seeds)
-    test = signals.test[:, frames].reshape(reference.shape)
+    height, width = signals.error.shape[-2:]
+    # of a large picture the middle
+    rows = min(height, max(MOST_PIXELS // width, SMALLEST))
+    top = (height - rows) // 2
+    reference = np.concatenate([signals.reference[frames, top : top + rows]] * signals.seeds)
+    test = signals.test[:, frames, top : top + rows].reshape(reference.shape)
     split = split_blur(test, reference)
     if split is None:
         return {"blur": None, "residual": None, "offset": None}

@@ -6,7 +6,6 @@ each pair of opposite frequencies one is kept, and stands for both.
 """
 
 import math
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
@@ -15,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from aliasbench.metrics.gate import Signals
+from aliasbench.metrics.gate import Signals, each_frame
 from aliasbench.scenes.model import FloatArray
 from aliasbench.scenes.projection import view_at
 
@@ -24,7 +23,6 @@ Frequency = tuple[float, float]
 # The band in which false patterns are visible as such, cycles per pixel.
 HIGHEST_VISIBLE = 0.25
 WHOLE_PERIODS = 1e-6
-WORKERS = min(2, os.cpu_count() or 1)
 # Lines of gratings that overlap: orders of each, and bins on either side of a line that are its own. Under a Hann
 # window it is 3: further than 3 bins away a line between two bins leaks less than 1 % of its amplitude.
 HIGHEST_ORDER = 4
@@ -202,8 +200,8 @@ def trim_to_periods(signals: Signals) -> Trim:
 
 def transform(picture: FloatArray, band: Band) -> NDArray[np.complex128]:
     """Return the transform (n,) of one picture (h, w) in the band, over the number of pixels."""
-    columns = fft.rfft(picture, axis=1, workers=WORKERS)[:, : int(HIGHEST_VISIBLE * band.width) + 1]
-    spectrum = fft.fft(columns, axis=0, workers=WORKERS)
+    columns = fft.rfft(picture, axis=1)[:, : int(HIGHEST_VISIBLE * band.width) + 1]
+    spectrum = fft.fft(columns, axis=0)
     out: NDArray[np.complex128] = spectrum[band.rows, band.columns] / picture.size
     return out
 
@@ -221,10 +219,13 @@ def _band_spectrum(signals: Signals) -> BandSpectrum:
     trim = trim_to_periods(signals)
     band = visible_band(trim.height, trim.width)
     values = np.empty((signals.seeds, signals.frames, len(band.nu)), dtype=np.complex128)
-    for seed in range(signals.seeds):
-        # One picture at a time: its transform stays in the processor's cache.
-        for frame in range(signals.frames):
-            values[seed, frame] = transform(trim.apply(signals.error[seed, frame]), band)
-    mean = np.mean(signals.error[..., : trim.height, : trim.width], axis=(2, 3))
+    mean = np.empty((signals.seeds, signals.frames))
+
+    def transform_frame(frame: int) -> None:
+        for seed, picture in enumerate(signals.error[:, frame]):
+            values[seed, frame] = transform(trim.apply(picture), band)
+            mean[seed, frame] = np.mean(picture[: trim.height, : trim.width])
+
+    each_frame(transform_frame, signals.frames)
     free = without_lines(band, harmonics(known_frequencies(signals)))
     return BandSpectrum(values, mean, band, free, trim.window is not None)

@@ -57,14 +57,14 @@ def test_constants_have_no_peak_and_extremes_do_not_overflow():
 def test_noise_of_a_bin_is_as_derived():
     band = visible_band(32, 32)
     assert len(band.nu) == blocks.BINS
-    powers = blocks.block_powers(np.random.default_rng(1).normal(size=(4000, 32, 32)))[:, band.rows, band.columns]
+    powers = blocks.block_powers(np.random.default_rng(1).normal(size=(2000, 32, 32)))[:, band.rows, band.columns]
     assert np.sum(np.outer(HANN, HANN) ** 2) / np.outer(HANN, HANN).sum() ** 2 == pytest.approx(
         (3 / 64) ** 2, rel=1e-12
     )
     low = np.abs(band.nu * 32).max(axis=1) <= 1
-    # An exponential power's mean over 4000 blocks varies by 1 / sqrt(4000); the largest of 98 by four times that.
+    # An exponential power's mean over 2000 blocks varies by 1 / sqrt(2000); the largest of 98 by four times that.
     assert powers[:, ~low].mean(axis=0) == pytest.approx(
-        np.full((~low).sum(), (3 / 64) ** 2), rel=4.5 / math.sqrt(4000)
+        np.full((~low).sum(), (3 / 64) ** 2), rel=4.5 / math.sqrt(2000)
     )
     # Where the block's mean, taken off, has a share.
     assert low.sum() == 4
@@ -74,7 +74,7 @@ def test_noise_of_a_bin_is_as_derived():
 @pytest.mark.parametrize("sigma", [1e-3, 0.2, 5.0])
 def test_peaks_of_white_noise_are_as_told(sigma):
     rng = np.random.default_rng(round(1000 * sigma))
-    trials = 500
+    trials = 250
     peaks = np.stack([blocks.peaks_of(sigma * rng.normal(size=(80, 80))) for _ in range(trials)])
     # H_68, the mean largest of 68 exponential powers, whose root has a mean of 2.17 and a standard deviation of .30.
     harmonic = special.digamma(69) + np.euler_gamma
@@ -94,7 +94,7 @@ def test_peaks_of_white_noise_are_as_told(sigma):
 @pytest.mark.parametrize("seeds", [1, 4])
 def test_of_noise_alone_the_p_value_is_a_bound(seeds):
     rng = np.random.default_rng(seeds)
-    trials = 800
+    trials = 400
     found = []
     for _ in range(trials):
         noise = rng.normal(size=(seeds, 64, 64))
@@ -275,7 +275,7 @@ def receding_checker(size, n, distance, pitch):
 @pytest.mark.parametrize(("distance", "pitch"), [(3600.0, 20.0), (6400.0, 30.0)])
 def test_receding_checkers_have_their_ghosts_where_rows_meet_the_pattern(make_scene, rgb, distance, pitch):
     size = (128, 176)
-    truth = receding_checker(size, 24, distance, pitch)
+    truth = receding_checker(size, 12, distance, pitch)
     found = measure(
         "moire_peak", rgb(receding_checker(size, 1, distance, pitch)[None]), rgb(truth[None]), scene=make_scene(size)
     )

@@ -67,6 +67,22 @@ def test_a_known_line_of_the_scene_is_not_moire(make_scene, rgb):
     assert measure("moire_peak", test, truth, scene=scene).value == pytest.approx(0.0, abs=1e-12)
 
 
+@pytest.mark.parametrize(("seeds", "frames"), [(1, 2), (3, 1), (2, 5)])
+def test_scores_of_several_seeds_and_frames_are_their_quadratic_means(make_scene, rgb, seeds, frames):
+    rng = np.random.default_rng(seeds)
+    truth = grating(1 / 8, 1.0, 66, 40)[0] + np.zeros((frames, 1, 1))
+    test = truth + rng.normal(size=(seeds, frames, 40, 66)) * rng.uniform(size=(seeds, frames, 1, 1))
+    scene = make_scene((66, 40), facts=Facts(gratings=(GratingFact((1 / 8, 0.0)),)))
+    for name in ("moire", "moire_peak"):
+        together = measure(name, rgb(test), rgb(truth), scene=scene)
+        alone = [
+            float(measure(name, rgb(test[s, t][None]), rgb(truth[t][None]), scene=scene).value)
+            for s in range(seeds)
+            for t in range(frames)
+        ]
+        assert together.value == pytest.approx(np.sqrt(np.mean(np.square(alone))), rel=1e-12)
+
+
 def test_a_known_grating_without_whole_periods_is_windowed(make_scene, rgb):
     nu = 1 + 1 / (8 * math.sqrt(3))
     test, truth = pair(nu, 1, rgb)

@@ -59,11 +59,14 @@ def test_point_sampled_edge_shimmers_as_derived(make_scene, rgb):
 def test_point_sampled_thin_line_has_the_derived_square_error(make_scene, rgb, line, expected):
     sub = 320
     scene = pan_scene(make_scene, sub)
-    test, truth = (panned(bar(line), sub, scene.animation.frames) for bar in (point_bar, box_bar))
+    # All frames one below the other: their squares are the same, and one picture is measured sooner than 5120.
+    test, truth = (panned(bar(line), sub, scene.animation.frames).reshape(1, -1, W) for bar in (point_bar, box_bar))
     assert line - line**2 - line**3 / 3 == pytest.approx(expected, abs=1e-7)
-    score = measure("rmse", rgb(test), rgb(truth), scene=scene)
+    score = measure("rmse", rgb(test), rgb(truth), scene=scene, filter_radius_px=0.0)
     # Line and pixel bounds are multiples of 1 / sub: midpoint rule on pieces with second derivative at most 2.
     assert float(score.value or 0.0) ** 2 * W == pytest.approx(expected, abs=1e-7 + 4 / (24 * sub**2))
+    energy = measure("rmse", rgb(truth), rgb(0.0 * truth), scene=scene, filter_radius_px=0.0)
+    assert float(energy.value or 0.0) ** 2 * W == pytest.approx(line**2 - line**3 / 3, abs=4 / (24 * sub**2))
 
 
 def test_square_error_is_static_plus_shimmer_exactly(make_scene, rgb):
@@ -85,6 +88,29 @@ def test_panned_sinusoid_shimmers_by_its_amplitude_error(make_scene, rgb, nu, ex
     assert abs(1 - np.sinc(nu)) / math.sqrt(2) == pytest.approx(expected, abs=1e-6)
     score = measure("shimmer", rgb(test), rgb(truth), scene=scene)
     assert score.value == pytest.approx(abs(1 - np.sinc(nu)) / math.sqrt(2), rel=1e-9)
+
+
+@pytest.mark.parametrize("nu", [0.3, 1.2, 2.0])
+def test_where_frames_repeat_a_wave_shimmer_depends_on_its_phase(make_scene, rgb, nu):
+    """Moved by whole cycles a frame a wave stands still, by half cycles it has two values and no mean square of 1/2."""
+    scene = make_scene((7, 4))
+    step = 1.0 - np.sinc(nu)
+    for cycles_per_frame, phases in ((0.0, 16), (1.0, 16), (0.5, 16)):
+        squares = []
+        for phase in np.arange(phases) / phases:
+            turn = cycles_per_frame * np.arange(6)[:, None] + nu * np.arange(7) + phase
+            error = np.repeat(step * np.cos(2 * np.pi * turn)[:, None, :], 4, axis=1)
+            score = measure("shimmer", rgb(error), rgb(0.0 * error), scene=scene, filter_radius_px=0.0)
+            squares.append(float(score.value) ** 2)
+        if cycles_per_frame != 0.5:
+            assert max(squares) < 1e-24
+        else:
+            # Averaged over the phase it is the derived one again.
+            assert np.mean(squares) == pytest.approx(step**2 / 2, rel=1e-12)
+            one_pixel = measure(
+                "shimmer", rgb(error[..., :1]), rgb(0.0 * error[..., :1]), scene=scene, filter_radius_px=0.0
+            )
+            assert float(one_pixel.value) ** 2 == pytest.approx((step * math.cos(2 * math.pi * phase)) ** 2, rel=1e-9)
 
 
 @pytest.mark.parametrize(
