@@ -15,12 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
+from aliasbench.metrics.perceptual import DISPLAY
 from aliasbench.metrics.spectrum import BandSpectrum
 from aliasbench.scenes.model import FloatArray
 
 CSF = "Kelly 1979, Daly 1998"
-# A display 3840 pixels wide, seen from as far away as it is wide.
-PIXELS_PER_DEGREE = 3840.0 * math.pi / 180.0
+PIXELS_PER_DEGREE = DISPLAY.pixels_per_degree
 LOWEST_CYCLES_PER_DEGREE = 0.5
 # Largest G, at 1.574 degrees per second and 2.044 cycles per degree.
 LARGEST_SENSITIVITY = 219.956892
