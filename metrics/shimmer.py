@@ -13,6 +13,7 @@ from aliasbench.metrics.gate import Signals, each_frame
 from aliasbench.metrics.score import Score, rms, settle
 from aliasbench.metrics.sharpness import sharpness
 from aliasbench.metrics.spectrum import band_spectrum
+from aliasbench.metrics.structure import split_error
 from aliasbench.metrics.visibility import CSF, PIXELS_PER_DEGREE, visible_shimmer
 from aliasbench.scenes.model import FloatArray, PanFact
 from aliasbench.scenes.projection import view_at
@@ -37,12 +38,14 @@ def _shimmer_and_static(error: FloatArray) -> tuple[float, float]:
 def compute_shimmer(signals: Signals) -> Score:
     """Return SH_err = sqrt(mean over pixels of the variance in time of the error); extras: the static rest.
 
+    Of two or more seeds also what of it is no noise, `structured`: SH_err^2 = structured^2 + `noise_square`, the second
+    being the noise's variance in time (none where all frames have the same pattern of samples). The first is signed.
     `visible` is what of it the eye would see (see `visibility.visible_shimmer`) at `ppd` pixels per degree and `fps`
     frames per second: a secondary figure, which no ranking should rest on.
     """
     shimmer, static = shimmer_and_static(signals)
     fps = signals.scene.animation.fps
-    extras = {
+    extras: dict[str, object] = {
         "static": static,
         "rmse": rms(signals.error),
         "visible": visible_shimmer(band_spectrum(signals), fps),
@@ -50,6 +53,10 @@ def compute_shimmer(signals: Signals) -> Score:
         "fps": fps,
         "csf": CSF,
     }
+    if signals.seeds > 1:
+        split = split_error(signals)
+        extras["structured"] = split.root(split.moving)
+        extras["noise_square"] = float(np.square(shimmer)) - split.square(split.moving)
     return settle(shimmer, extras, floor=signals.floor)
 
 

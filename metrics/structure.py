@@ -1,8 +1,10 @@
-"""Noise against structure: what changes with the seed, and what stays.
+"""Noise against structure: what changes with the seed, and what stays; and of what stays, what moves.
 
-Both are estimated without bias from the same renderings, and their squares add up to the mean square error exactly.
-After Durand 2011, Subr and Kautz 2013.
+All are estimated without bias from the same renderings, and their squares add up to the mean square error exactly:
+mean E^2 = static + moving + noise. After Durand 2011, Subr and Kautz 2013.
 """
+
+from dataclasses import dataclass
 
 import numpy as np
 from scipy import ndimage
@@ -49,20 +51,90 @@ def compute_noise(signals: Signals) -> Score:
     return settle(value, extras, floor=0.0)
 
 
+@dataclass(frozen=True, slots=True)
+class Split:
+    """The mean square error's parts, in units of the contrast squared; the estimates are signed.
+
+    Attributes
+    ----------
+    scale : float
+        The largest error: the squares are of errors divided by it, so that they neither overflow nor vanish.
+    mse, static, moving, noise : float
+        mse = static + moving + noise, to rounding.
+    """
+
+    scale: float
+    mse: float
+    static: float
+    moving: float
+    noise: float
+
+    def square(self, part: float) -> float:
+        """Return a part in units of the contrast squared."""
+        return part * float(np.square(self.scale))
+
+    def root(self, part: float) -> float:
+        """Return a part's root in units of the contrast, with its sign."""
+        return self.scale * signed_root(part)
+
+
+def split_error(signals: Signals) -> Split:
+    """Return what the error of two or more seeds is made of: static structure, moving structure and noise.
+
+    With e(t) what all seeds share, the structure's square is the mean of e(t)^2 over frames, the static one that of
+    (mean over t of e)^2, and the moving one their difference, the variance of e in time. Products of different seeds
+    have the expectation of products of e, however the noise of one seed's frames is correlated: all of a seed's frames
+    may have the same pattern of samples. The mean over pairs of seeds of x_a x_b is
+
+        sum_{a != b} x_a x_b / (S (S - 1)) = (mean x)^2 - s^2 / S,
+
+    s^2 the variance between seeds (S - 1 in the denominator): for x = E(t) and for x = the mean of E over frames.
+    """
+    return signals.once("split of the error", lambda: _split(signals))
+
+
+def _split(signals: Signals) -> Split:
+    scale = max(float(np.max(signals.error)), -float(np.min(signals.error)))
+    if scale == 0.0:
+        return Split(0.0, 0.0, 0.0, 0.0, 0.0)
+    seeds, frames = signals.error.shape[:2]
+    structure = noise = mse = 0.0
+    total = np.zeros(signals.error.shape[:1] + signals.error.shape[2:])
+    for frame in range(frames):
+        error = signals.error[:, frame] / scale
+        total += error
+        pair, own = _pair_product(error)
+        structure, noise, mse = structure + pair, noise + own, mse + float(np.mean(error**2))
+    static = _pair_product(total / frames)[0] if frames > 1 else structure
+    structure, noise, mse = structure / frames, noise / frames, mse / frames
+    return Split(scale, mse, static, structure - static, noise)
+
+
+def _pair_product(values: FloatArray) -> tuple[float, float]:
+    """Return the mean product of different seeds' values (seeds, h, w), and the mean variance between seeds."""
+    seeds = values.shape[0]
+    mean = np.mean(values, axis=0)
+    variance = float(np.mean((values - mean) ** 2)) * seeds / (seeds - 1)
+    return float(np.mean(mean**2)) - variance / seeds, variance
+
+
 def compute_structure(signals: Signals) -> Score:
     """Return the RMS of the error that all seeds share, with the sign of its unbiased square.
 
     str^2 = mean (mean error^2 - s^2 / seeds); extras: F_str = str^2 / mean square error (1 deterministic, 0
-    unbiased and random, None without error).
+    unbiased and random, None without error), and the full split of the mean square error (see `split_error`):
+    `static_square` + `moving_square` + `noise_square`, with the signed roots `static` and `moving` (None of one frame).
     """
-    scale = float(np.max(np.abs(signals.error)))
-    if scale == 0.0:
-        return settle(0.0, {"square": 0.0, "fraction": None}, floor=signals.floor)
-    error = signals.error / scale
-    mean = np.mean(error, axis=0)
-    variance = np.var(error, axis=0, ddof=1)
-    square = float(np.mean(mean**2 - variance / signals.seeds))
-    mse = float(np.mean(error**2))
-    fraction = square / mse if mse * float(np.square(scale)) >= NOTHING else None
-    extras = {"square": square * float(np.square(scale)), "fraction": fraction, "seeds": signals.seeds}
-    return settle(scale * signed_root(square), extras, floor=signals.floor)
+    split = split_error(signals)
+    square = split.static + split.moving
+    extras: dict[str, object] = {
+        "square": split.square(square),
+        "fraction": square / split.mse if split.square(split.mse) >= NOTHING else None,
+        "seeds": signals.seeds,
+        "static_square": split.square(split.static),
+        "moving_square": split.square(split.moving),
+        "noise_square": split.square(split.noise),
+        "static": split.root(split.static),
+        "moving": split.root(split.moving) if signals.frames > 1 else None,
+    }
+    return settle(split.root(square), extras, floor=signals.floor)

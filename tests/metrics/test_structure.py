@@ -44,6 +44,99 @@ def test_planted_noise_and_structure_are_found_each(make_scene, rgb):
     assert got["structure"].extras["square"] == pytest.approx(static**2, abs=5 * spread / math.sqrt(PIXELS))
 
 
+def planted(rng, *, seeds, frames, static, moving, noise, fresh, shape=(64, 64)):
+    """(seeds, frames, h, w): a still pattern, one that changes sign from frame to frame, and noise between seeds.
+
+    Both patterns are -1 or 1 everywhere and cancel each other's products exactly: their squares are the truth.
+    """
+    still = np.ones(shape)
+    still[::2] = -1.0
+    restless = np.where(np.arange(frames) % 2 == 0, 1.0, -1.0)[:, None, None] * np.where(
+        np.arange(shape[1]) % 2 == 0, 1.0, -1.0
+    )
+    own = rng.normal(size=(seeds, frames if fresh else 1, *shape))
+    return static * still + moving * restless + noise * own
+
+
+@pytest.mark.parametrize("shape", [(2, 1, 6, 7), (3, 5, 4, 9), (7, 2, 3, 3)])
+@pytest.mark.parametrize("size", [1.0, 1e-120, 1e120])
+def test_the_full_split_adds_up_and_is_made_of_products_of_different_seeds(make_scene, rgb, shape, size):
+    test = size * np.random.default_rng(11).normal(size=shape)
+    truth = np.zeros(shape[1:])
+    scene = make_scene(shape[:1:-1])
+    options = {"scene": scene, "filter_radius_px": 0.0}
+    extras = measure("structure", rgb(test), rgb(truth), **options).extras
+    pairs = [(a, b) for a in range(shape[0]) for b in range(a)]
+    unit = test / size
+    structure = np.mean([np.mean(unit[a] * unit[b]) for a, b in pairs])
+    static = np.mean([np.mean(unit[a].mean(axis=0) * unit[b].mean(axis=0)) for a, b in pairs])
+    # Squares of 1e-120 and 1e120 are still numbers; a sum of some hundred of them is off by a few ulp of the largest.
+    parts = [float(extras[name]) / size**2 for name in ("static_square", "moving_square", "noise_square")]
+    assert parts == pytest.approx([static, structure - static, np.mean(unit**2) - structure], abs=1e-13)
+    assert sum(parts) == pytest.approx(np.mean(unit**2), rel=1e-13)
+    assert float(extras["static"]) == pytest.approx(size * math.copysign(math.sqrt(abs(static)), static), rel=1e-6)
+    if shape[1] == 1:
+        assert (parts[1], extras["moving"]) == (0.0, None)
+    else:
+        moving = structure - static
+        assert float(extras["moving"]) == pytest.approx(size * math.copysign(math.sqrt(abs(moving)), moving), rel=1e-6)
+
+
+@pytest.mark.parametrize("fresh", [True, False])
+@pytest.mark.parametrize(
+    ("seeds", "frames", "static", "moving", "noise"),
+    [(4, 6, 0.05, 0.03, 0.1), (2, 12, 0.0, 0.04, 0.2), (3, 2, 0.08, 0.0, 0.05), (2, 4, 0.0, 0.0, 0.3)],
+)
+def test_the_full_split_finds_what_was_planted(make_scene, rgb, fresh, seeds, frames, static, moving, noise):
+    test = planted(
+        np.random.default_rng(12), seeds=seeds, frames=frames, static=static, moving=moving, noise=noise, fresh=fresh
+    )
+    truth = np.zeros(test.shape[1:])
+    scene, options = make_scene((64, 64)), {"filter_radius_px": 0.0}
+    structure = measure("structure", rgb(test), rgb(truth), scene=scene, **options).extras
+    shimmer = measure("shimmer", rgb(test), rgb(truth), scene=scene, **options)
+    # Independent values of noise: of all frames, or of one. A mean product of a pattern of size p with the mean of the
+    # seeds' noise has the standard deviation p noise / sqrt(seeds values), counted twice, and one of noise with noise
+    # noise^2 sqrt(2 / (seeds (seeds - 1) values)); for the moving part both the frames' and the means' are subtracted.
+    values = PIXELS * (frames if fresh else 1)
+    cross = 2 * math.hypot(static, moving) * noise / math.sqrt(seeds)
+    spread = math.hypot(cross, noise**2 * math.sqrt(2 / (seeds * (seeds - 1)))) / math.sqrt(values)
+    assert structure["static_square"] == pytest.approx(static**2, abs=5 * spread)
+    assert structure["moving_square"] == pytest.approx(moving**2, abs=5 * math.sqrt(2) * spread)
+    # Relative standard deviation of a variance from (seeds - 1) values: sqrt(2 / those).
+    close = 5 * math.sqrt(2 / ((seeds - 1) * values))
+    assert structure["noise_square"] == pytest.approx(noise**2, rel=close)
+    assert shimmer.extras["structured"] == structure["moving"]
+    # Noise that all frames share does not shimmer; the variance of N fresh values (population) is 1 - 1 / N of it.
+    share = noise**2 * (1 - 1 / frames) if fresh else 0.0
+    assert shimmer.extras["noise_square"] == pytest.approx(share, rel=close, abs=5 * math.sqrt(2) * spread)
+    assert shimmer.value**2 == pytest.approx(
+        structure["moving_square"] + shimmer.extras["noise_square"], rel=1e-12, abs=1e-15
+    )
+
+
+def test_the_full_split_is_unbiased_where_noise_is_all_there_is(make_scene, rgb):
+    rng = np.random.default_rng(13)
+    scene, trials, frames = make_scene((8, 8)), 400, 3
+    truth = np.zeros((frames, 8, 8))
+    for fresh in (True, False):
+        found = []
+        for _ in range(trials):
+            test = planted(rng, seeds=2, frames=frames, static=0.0, moving=0.0, noise=1.0, fresh=fresh, shape=(8, 8))
+            extras = measure("structure", rgb(test), rgb(truth), scene=scene, filter_radius_px=0.0).extras
+            found.append([extras["static_square"], extras["moving_square"]])
+        mean, deviation = np.mean(found, axis=0), np.std(found, axis=0, ddof=1)
+        # Five standard errors of the mean over trials; that of a moving part which is always 0 is rounding.
+        assert np.all(np.abs(mean) <= 5 * deviation / math.sqrt(trials) + 1e-12)
+        assert deviation[0] > 0.01
+
+
+def test_shimmer_of_one_seed_says_nothing_of_noise(make_scene, rgb):
+    pictures = np.random.default_rng(14).normal(size=(3, 8, 8))
+    score = measure("shimmer", rgb(pictures), rgb(np.zeros((3, 8, 8))), scene=make_scene((8, 8)))
+    assert "structured" not in score.extras
+
+
 def test_a_deterministic_renderer_is_all_structure(make_scene, rgb):
     test = np.repeat(np.random.default_rng(4).normal(size=(1, 1, 12, 12)), 2, axis=0)
     truth = np.zeros((1, 12, 12))
