@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from aliasbench.bench.centers import Further
 from aliasbench.bench.suite import Case
 from aliasbench.bench.truth import Reference, crop_radius
 from aliasbench.renderers.frame import Frame, Prepared
@@ -45,7 +46,9 @@ def describe_nonfinite(test: NDArray[np.float32]) -> str | None:
     return f"{count} values are not finite, the first in frame {frame} at row {row}, column {column}"
 
 
-def measure_all(case: Case, test: NDArray[np.float32], reference: Reference) -> dict[str, dict[str, object]]:
+def measure_all(
+    case: Case, test: NDArray[np.float32], reference: Reference, further: Further | None = None
+) -> dict[str, dict[str, object]]:
     """Return every metric of a case by name: {"value": float or None, "status": str, "extras": {...}}.
 
     Raises
@@ -54,16 +57,31 @@ def measure_all(case: Case, test: NDArray[np.float32], reference: Reference) -> 
         If a metric breaks or returns a value that is not finite.
     """
     from aliasbench.metrics import catalog
+    from aliasbench.metrics.gate import Centers
 
+    truth = reference.pixels[: case.frames]
+    centers = None
+    if further is not None:
+        # Of a closed shutter these are the same arrays, which says that nothing is sampled in time.
+        at_center = truth if further.reference is reference else further.reference.pixels[: case.frames]
+        full = further.full_shutter
+        centers = Centers(
+            further.test,
+            at_center,
+            None if full is None else full.pixels[: case.frames],
+            further.reference.uncertainty or 0.0,
+            0.0 if full is None else full.uncertainty or 0.0,
+        )
     try:
         scores = catalog.measure_all(
             case.metrics if case.metrics is not None else catalog.METRICS,
             test,
-            reference.pixels[: case.frames],
+            truth,
             scene=case.scene,
             filter_radius_px=crop_radius(case.technique),
             reference_uncertainty=reference.uncertainty or 0.0,
             frame_start=0,
+            centers=centers,
         )
         return {
             name: {"value": plain(score.value), "status": score.status, "extras": plain(score.extras)}

@@ -15,8 +15,22 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from aliasbench.bench import store as stores
 from aliasbench.bench.attempt import Attempt
+from aliasbench.bench.centers import (
+    Further,
+    Truth,
+    center_frames,
+    center_technique,
+    center_truth,
+    full_truth,
+    own_truth,
+    truths_of,
+    truths_of_all,
+)
 from aliasbench.bench.frames import write_image
 from aliasbench.bench.machine import describe_machine
 from aliasbench.bench.quality import MetricError, describe_nonfinite, measure_all, render_frames
@@ -24,7 +38,7 @@ from aliasbench.bench.resume import check_folder, forget_lost_pictures, refuse_o
 from aliasbench.bench.store import RunStore, StoredCase
 from aliasbench.bench.suite import Case, Plan, Request, plan_run
 from aliasbench.bench.timing import interleaved
-from aliasbench.bench.truth import Reference, reference_technique, render_reference
+from aliasbench.bench.truth import Reference, render_reference
 from aliasbench.renderers import catalog
 from aliasbench.renderers.frame import Prepared
 from aliasbench.scenes.errors import InputError
@@ -143,7 +157,8 @@ def execute(cases: Iterable[Case], store: RunStore, on_step: OnStep | None = Non
 def _steps(group: list[Case], stored: Mapping[str, StoredCase]) -> int:
     """Return how many renders are left to do if none of them fails."""
     todo = [c for c in group if stored[c.id].outcome is None]
-    quality = sum(_reference_frames(todo).values()) + sum(c.frames * len(c.seeds) for c in todo)
+    quality = sum(truth.frames for truth in truths_of_all(todo).values())
+    quality += sum(c.frames * len(c.seeds) + center_frames(c) for c in todo)
     return quality + sum(c.rounds - len(stored[c.id].seconds) + 1 for c in group if not _is_timed(c, stored[c.id]))
 
 
@@ -151,50 +166,40 @@ def _is_timed(case: Case, stored: StoredCase) -> bool:
     return len(stored.seconds) >= case.rounds
 
 
-def _reference_frames(group: list[Case]) -> Mapping[str, int]:
-    """Return how many frames of each reference the cases need."""
-    frames: dict[str, int] = {}
-    for case in group:
-        text = reference_technique(case.technique, case.texture_truth).text
-        frames[text] = max(frames.get(text, 0), case.frames)
-    return frames
-
-
 def _find_quality(group: list[Case], live: _Group) -> None:
     """Render and measure the cases that have no outcome yet."""
     known = {stored.spec["id"] for stored in live.store.cases() if stored.outcome is not None}
     todo = [case for case in group if case.id not in known]
-    frames = _reference_frames(todo)
+    truths = truths_of_all(todo)
     for case in todo:
-        text = reference_technique(case.technique, case.texture_truth).text
-        if text not in live.references:
-            live.progress.say(f"{case.scene.name}: {text}")
-            live.references[text] = _make_reference(case, frames[text], live)
+        for name in (truth.name for truth in truths_of(case)):
+            if name not in live.references:
+                live.progress.say(f"{case.scene.name}: {name}")
+                live.references[name] = _make_reference(truths[name], case.size, live)
         live.progress.say(f"{case.scene.name}: {case.technique.text}")
         attempt = Attempt()
         with attempt:
-            outcome = _quality_of(case, live.references[text], live)
+            outcome = _quality_of(case, live)
         if attempt.error is not None:
             live.prepared.pop(case.id, None)
             outcome = {"status": attempt.status, "error": attempt.reason}
         live.store.add_outcome(case.id, outcome, trace=attempt.trace)
 
 
-def _make_reference(case: Case, frames: int, live: _Group) -> Reference | Attempt:
-    technique = reference_technique(case.technique, case.texture_truth)
+def _make_reference(truth: Truth, size: tuple[int, int], live: _Group) -> Reference | Attempt:
     with Attempt() as attempt:
-        reference = render_reference(case.scene, technique, case.size, frames, live.progress.advance)
-        write_image(live.store.run_dir / _reference_path(case, technique.text), reference.pixels[0])
+        reference = render_reference(truth.scene, truth.technique, size, truth.frames, live.progress.advance)
+        write_image(live.store.run_dir / _reference_path(truth, size), reference.pixels[0])
         return reference
     return attempt
 
 
-def _reference_path(case: Case, text: str) -> str:
-    digest = content_digest((case.scene, case.size, text))
+def _reference_path(truth: Truth, size: tuple[int, int]) -> str:
+    digest = content_digest((truth.scene, size, truth.technique.text))
     return f"{stores.REFERENCES}/{digest[:24]}.exr"
 
 
-def _quality_of(case: Case, reference: Reference | Attempt, live: _Group) -> dict[str, object]:
+def _quality_of(case: Case, live: _Group) -> dict[str, object]:
     """Return the outcome of a case: its pictures rendered, the first one kept, all of them measured."""
     prepared = _prepare(case, live)
     test, first = render_frames(case, prepared, live.progress.advance)
@@ -208,17 +213,34 @@ def _quality_of(case: Case, reference: Reference | Attempt, live: _Group) -> dic
         "images": images,
         "metrics": {},
     }
+    truth = own_truth(case)
+    reference = live.references[truth.name]
     if isinstance(reference, Attempt):
         return outcome | {"status": "failed", "error": f"no reference: {reference.reason}"}
-    images["reference"] = _reference_path(case, reference.text)
+    images["reference"] = _reference_path(truth, case.size)
     outcome |= {"uncertainty": reference.uncertainty, "uncertainty_kind": reference.uncertainty_kind}
-    problem = describe_nonfinite(test)
-    if problem is not None:
+    further = _further(case, test, live)
+    problem = describe_nonfinite(test) or (further and describe_nonfinite(further.test))
+    if problem:
         outcome |= {"status": "failed", "error": problem}
     try:
-        return outcome | {"metrics": measure_all(case, test, reference)}
+        return outcome | {"metrics": measure_all(case, test, reference, further)}
     except MetricError as error:
         return outcome | {"status": "failed", "error": str(error)}
+
+
+def _further(case: Case, test: NDArray[np.float32], live: _Group) -> Further | None:
+    """Return what tells errors in space from errors in time; None where nothing asks for it or the truth failed."""
+    found = [None if t is None else live.references[t.name] for t in (center_truth(case), full_truth(case))]
+    at_center, full_shutter = (None if isinstance(reference, Attempt) else reference for reference in found)
+    if at_center is None:
+        return None
+    if center_frames(case):
+        technique = center_technique(case)
+        live.progress.say(f"{case.scene.name}: {technique.text}")
+        with catalog.prepare(case.scene, technique, size=case.size) as prepared:
+            test, _ = render_frames(case, prepared, live.progress.advance)
+    return Further(test, at_center, full_shutter)
 
 
 def _prepare(case: Case, live: _Group) -> Prepared:

@@ -14,7 +14,9 @@ if TYPE_CHECKING:
 NEGLIGIBLE = 1e-9  # what is left of a zero in float64
 DASH = "–"
 WIDE = 110  # characters from which there is room for everything
+ROOMY = 130  # and from which there is room for how the error divides into space and time
 HEADLINES = ("rmse", "jaggies", "shimmer", "moire", "strobing", "apparent_rate")
+DIVISION = ("spatial", "temporal")
 SHORT = {"apparent_rate": "rev/s"}
 
 
@@ -22,7 +24,8 @@ def record_tables(run: Run, width: int) -> list["Table"]:
     """Return a table for each scene: time with its interval, the headline metrics it has, and what to beware of.
 
     A dash is a metric without a value for this record; "< x" one that is under the reference's floor x. Where `width`,
-    in characters, is small, intervals and notes make way and a doubtful time is marked with ~.
+    in characters, is small, intervals and notes make way and a doubtful time is marked with ~; how the error of a scene
+    that moves divides into space and time stands where there is much room.
     """
     from rich import box
     from rich.table import Table
@@ -33,7 +36,8 @@ def record_tables(run: Run, width: int) -> list["Table"]:
     wide = width >= WIDE
     for (scene, size), group in groupby(run["records"], key=lambda r: (r["scene"], tuple(r["size"]))):
         records = list(group)
-        names = [n for n in HEADLINES if any(_number(r, n) != DASH for r in records)]
+        shown = (*HEADLINES, *DIVISION) if width >= ROOMY else HEADLINES
+        names = [n for n in shown if any(_number(r, n) != DASH for r in records)]
         title = Text(f"{printable(scene)}  {size[0]} x {size[1]}", "bold")
         table = Table(box=box.SIMPLE_HEAD, title=title, title_justify="left", pad_edge=False, padding=(0, 1, 0, 0))
         longest = max(len(r["technique"]) for r in records)

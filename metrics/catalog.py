@@ -16,13 +16,14 @@ from aliasbench.metrics import (
     moire,
     mtf,
     perceptual,
+    separation,
     sharpness,
     shimmer,
     strobing,
     structure,
     video_quality,
 )
-from aliasbench.metrics.gate import Signals, open_gate
+from aliasbench.metrics.gate import Centers, Signals, open_gate
 from aliasbench.metrics.score import Metric, Score, finish
 from aliasbench.scenes.errors import NotAvailableError, unknown_name
 from aliasbench.scenes.model import Scene
@@ -32,6 +33,7 @@ _BURNS = "area locator of a known edge; after Burns 2006, ISO/IEC 24790"
 _ANDERSSON = "Andersson et al. 2020, for bright scenes 2021; OpenImageIO"
 _ESFR = "slanted edge of known angle; after ISO 12233"
 _WATSON = "angular harmonics; after Watson, Ahumada, Farrell 1986"
+_CENTER = "definition; the technique and its reference at the shutter's middle"
 _SPLIT = "unbiased split over seeds; after Durand 2011, Subr and Kautz 2013"
 
 METRICS: Mapping[str, Metric] = {
@@ -146,6 +148,33 @@ METRICS: Mapping[str, Metric] = {
         ),
         Metric("mtf50", "MTF50", "cycles/px", "higher", ("edges",), mtf.compute_mtf50, _ESFR),
         Metric("edge_width", "edge width (10-90 %)", "px", "lower", ("edges",), sharpness.compute_edge_width, _ESFR),
+        Metric(
+            "spatial",
+            "error in space",
+            "contrast",
+            "lower",
+            ("reference", "centers"),
+            separation.compute_spatial,
+            _CENTER,
+        ),
+        Metric(
+            "temporal",
+            "error in time",
+            "contrast²",
+            "zero",
+            ("reference", "centers"),
+            separation.compute_temporal,
+            _CENTER,
+        ),
+        Metric(
+            "shutter",
+            "off a full shutter",
+            "contrast",
+            "lower",
+            ("centers",),
+            separation.compute_shutter,
+            "definition; the reference and one with a full-frame shutter",
+        ),
         Metric("bias", "bias", "contrast", "zero", ("reference", "seeds"), bias.compute_bias, "Kirk and Arvo 1991"),
     )
 }
@@ -200,6 +229,7 @@ def measure(
     filter_radius_px: float = 0.5,
     reference_uncertainty: float = 0.0,
     frame_start: int = 0,
+    centers: Centers | None = None,
 ) -> Score:
     """Return one metric's score of a sequence; never NaN or infinite.
 
@@ -220,6 +250,9 @@ def measure(
         `below_reference_floor`.
     frame_start : int
         The scene's number of the first frame.
+    centers : Centers, optional
+        What `spatial`, `temporal` and `shutter` compare; where the shutter is not open, with test and reference
+        themselves in it.
 
     Raises
     ------
@@ -236,6 +269,7 @@ def measure(
         filter_radius_px=filter_radius_px,
         reference_uncertainty=reference_uncertainty,
         frame_start=frame_start,
+        centers=centers,
     )[name]
 
 
@@ -248,6 +282,7 @@ def measure_all(
     filter_radius_px: float = 0.5,
     reference_uncertainty: float = 0.0,
     frame_start: int = 0,
+    centers: Centers | None = None,
 ) -> dict[str, Score]:
     """Return several metrics' scores, passing the gate once; arguments and errors as of `measure`."""
     metrics = [find_metric(name) for name in names]
@@ -258,6 +293,7 @@ def measure_all(
         filter_radius_px=filter_radius_px,
         reference_uncertainty=reference_uncertainty,
         frame_start=frame_start,
+        centers=centers,
     )
     if isinstance(gated, Score):
         return {m.name: finish(gated) for m in metrics}
@@ -269,6 +305,10 @@ def _score(metric: Metric, signals: Signals) -> Score:
     for fact, given in (("edges", facts.edges), ("rotors", facts.rotors), ("pans", facts.pans)):
         if fact in metric.needs and not given:
             return Score(None, "not_applicable", {"missing": fact})
+    if "centers" in metric.needs and signals.centers is None:
+        return Score(None, "not_applicable", {"missing": "centers"})
+    if "centers" in metric.needs and isinstance(signals.centers, Score):
+        return finish(signals.centers)
     if "frames" in metric.needs and signals.frames < 2:
         return Score(None, "undefined_one_frame", {"frames": signals.frames})
     if "seeds" in metric.needs and signals.seeds < 2:

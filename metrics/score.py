@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from aliasbench.metrics.gate import Signals
 
 Better = Literal["lower", "higher", "zero", "truth"]
-Need = Literal["reference", "frames", "seeds", "edges", "rotors", "pans"]
+Need = Literal["reference", "frames", "seeds", "edges", "rotors", "pans", "centers"]
 BLOCK = 1 << 16
 
 
@@ -58,7 +58,8 @@ class Metric:
     better : {"lower", "higher", "zero", "truth"}
         The direction of improvement; "zero" is signed, "truth" is better the nearer to the scene's own figure.
     needs : tuple of str
-        "reference" (it measures error), "frames" and "seeds" (two or more of them), or a fact of the scene.
+        "reference" (it measures error), "frames" and "seeds" (two or more of them), "centers" (further sequences), or
+        a fact of the scene.
     compute : callable
         Takes the gated signals, returns the score.
     source : str

@@ -97,7 +97,7 @@ def _split(signals: Signals) -> Split:
     scale = max(float(np.max(signals.error)), -float(np.min(signals.error)))
     if scale == 0.0:
         return Split(0.0, 0.0, 0.0, 0.0, 0.0)
-    seeds, frames = signals.error.shape[:2]
+    frames = signals.frames
     structure = noise = mse = 0.0
     total = np.zeros(signals.error.shape[:1] + signals.error.shape[2:])
     for frame in range(frames):

@@ -15,6 +15,8 @@ from aliasbench.reports.records import Record, Score
 
 # One metric for each artifact: stairsteps, shimmer, moiré, strobing. The table of all records has the rest.
 HEADLINES = ("rmse", "ssim", "jaggies", "shimmer", "moire", "strobing", "apparent_rate")
+# How the error divides into space and time, of scenes that move.
+DIVISION = ("spatial", "temporal")
 MOST_EXTRAS = 8
 
 Column = tuple[str, tuple[int, int], str]  # of the overview: scene, size and run
@@ -56,7 +58,8 @@ class Table:
 
 def scene_table(records: Sequence[Record], runs: Sequence[str]) -> Table:
     """Return the headline metrics of one scene, a row a record, the best value of each column marked."""
-    names = _present(records, HEADLINES)
+    moves = any(record.value(name) is not None for record in records for name in DIVISION)
+    names = _present(records, (*HEADLINES, *DIVISION) if moves else HEADLINES)
     headings = [Heading("technique"), *_run_heading(runs), Heading("time", "median time of one frame", True, "ms")]
     headings += [_metric_heading(name) for name in names]
     best = {name: _best(name, records) for name in names}

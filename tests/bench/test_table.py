@@ -62,6 +62,18 @@ def test_only_metrics_that_some_record_has_get_a_column(run: Run) -> None:
     assert "jaggies" not in text
 
 
+def test_how_the_error_divides_into_space_and_time_stands_where_scenes_move_and_there_is_room(run: Run) -> None:
+    moves = {
+        "spatial": {"value": 0.0312, "status": "ok", "extras": {}},
+        "temporal": {"value": -0.00456, "status": "ok", "extras": {}},
+    }
+    still = {name: {"value": None, "status": "not_applicable", "extras": {}} for name in moves}
+    for metrics, width, shown in ((moves, 140, True), (moves, 110, False), (still, 140, False)):
+        text = printed({**run, "records": [record("a", "x", metrics=metrics)]}, width)
+        for word in ("spatial", "0.0312", "temporal", "-0.00456"):
+            assert (word in text) == shown
+
+
 def test_a_reason_is_given_once_with_all_its_cases_and_as_it_was_written(run: Run) -> None:
     assert failure_lines(run) == ["failed: lamp [bold]broke\n    b by x, b by y"]
 

@@ -7,7 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from aliasbench.metrics.catalog import METRICS, PLANNED, measure, measure_all
+from aliasbench.metrics import catalog
+from aliasbench.metrics.catalog import METRICS, PLANNED
+from aliasbench.metrics.gate import Centers
 from aliasbench.scenes.model import Animation, Facts, PanFact, RotorFact, Scene
 
 SIDE, FRAMES, SEEDS = 64, 4, 8
@@ -35,11 +37,24 @@ DOCUMENTED = [
     "noise",
     "structure",
     "bias",
+    "spatial",
+    "temporal",
+    "shutter",
     "mtf50",
     "edge_width",
 ]
 # Whose value for a perfect picture is a reason, not a number.
 PERFECT_STATUS = {"psnr": "identical", "buzz": "undefined_no_shimmer"}
+
+
+def measure_all(names, test, reference, **options):
+    """Scores of a sequence whose further sequences, at the shutter's middle, are copies of it."""
+    centers = Centers(test.copy(), reference.copy(), reference.copy())
+    return catalog.measure_all(names, test, reference, centers=centers, **options)
+
+
+def measure(name, test, reference, **options):
+    return measure_all((name,), test, reference, **options)[name]
 
 
 @pytest.fixture(scope="module")

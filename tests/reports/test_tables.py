@@ -30,6 +30,21 @@ def test_what_is_not_applicable_is_a_dash_that_says_so(typical: Path) -> None:
     assert (cells[4].text, cells[4].title) == ("–", "not measured")
 
 
+def test_how_the_error_divides_into_space_and_time_stands_where_the_scene_moves(
+    fabricate: Fabricate, make_record: MakeRecord, make_score: MakeRecord
+) -> None:
+    moves = {"spatial": make_score(0.03), "temporal": make_score(-0.004, root=-0.0632)}
+    still = {name: make_score(None, "not_applicable") for name in moves}
+    rows = [make_record(scene, "raytrace:", metrics=m) for scene, m in (("turns", moves), ("stands", still))]
+    turns, stands = read(fabricate, rows)
+    table = tables.scene_table([turns], ["run"])
+    (cell,) = column(table, METRICS["temporal"].label)
+    assert (cell.text, cell.title) == ("-0.00400", "root -0.0632")
+    assert column(table, METRICS["spatial"].label)[0].text == "0.0300"
+    headings = [h.text for h in tables.scene_table([stands], ["run"]).headings]
+    assert not any(h.startswith(METRICS[name].label) for h in headings for name in moves)
+
+
 def test_headings_come_from_the_registry(typical: Path) -> None:
     (run,) = load_runs([typical])
     table = tables.scene_table(run.records, ["run"])
