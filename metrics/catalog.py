@@ -21,6 +21,7 @@ from aliasbench.metrics import (
     shimmer,
     strobing,
     structure,
+    translation,
     video_quality,
 )
 from aliasbench.metrics.gate import Centers, Signals, open_gate
@@ -117,13 +118,13 @@ METRICS: Mapping[str, Metric] = {
             moire.compute_moire_peak,
             "Fisher 1929",
         ),
-        Metric("strobing", "strobing (STROBE_abs)", "1", "lower", ("rotors",), strobing.compute_strobing, _WATSON),
+        Metric("strobing", "strobing (STROBE_abs)", "1", "lower", ("patterns",), strobing.compute_strobing, _WATSON),
         Metric(
             "strobing_err",
             "strobing error",
             "1",
             "lower",
-            ("reference", "rotors"),
+            ("reference", "patterns"),
             strobing.compute_strobing_err,
             _WATSON,
         ),
@@ -135,6 +136,15 @@ METRICS: Mapping[str, Metric] = {
             ("frames", "rotors"),
             strobing.compute_apparent_rate,
             _WATSON,
+        ),
+        Metric(
+            "apparent_velocity",
+            "apparent velocity",
+            "px/frame",
+            "truth",
+            ("frames", "gratings", "pans"),
+            translation.compute_apparent_velocity,
+            "lines in space and time; after Watson, Ahumada, Farrell 1986",
         ),
         Metric("noise", "noise", "contrast", "lower", ("reference", "seeds"), structure.compute_noise, _SPLIT),
         Metric(
@@ -302,7 +312,9 @@ def measure_all(
 
 def _score(metric: Metric, signals: Signals) -> Score:
     facts = signals.scene.facts
-    for fact, given in (("edges", facts.edges), ("rotors", facts.rotors), ("pans", facts.pans)):
+    patterns = facts.rotors or (facts.gratings and facts.pans)
+    known = {"edges": facts.edges, "rotors": facts.rotors, "pans": facts.pans, "gratings": facts.gratings}
+    for fact, given in {**known, "patterns": patterns}.items():
         if fact in metric.needs and not given:
             return Score(None, "not_applicable", {"missing": fact})
     if "centers" in metric.needs and signals.centers is None:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from aliasbench.metrics.gate import Signals
 
 Better = Literal["lower", "higher", "zero", "truth"]
-Need = Literal["reference", "frames", "seeds", "edges", "rotors", "pans", "centers"]
+Need = Literal["reference", "frames", "seeds", "edges", "rotors", "pans", "gratings", "patterns", "centers"]
 BLOCK = 1 << 16
 
 
@@ -35,9 +35,9 @@ class Score:
         ``extrapolated`` (a value beyond what was measured), or the reason for None: ``identical``, ``nonfinite``,
         ``overflow``, ``undefined_zero_contrast``, ``undefined_one_frame``, ``undefined_one_count``,
         ``undefined_too_small``, ``undefined_no_shimmer``, ``undefined_zero_flux``, ``undefined_no_modulation``,
-        ``undefined_uniform_error``, ``undefined_too_few_phases``, ``undefined_no_edge``, ``undefined_no_crossing``,
-        ``below_resolution``, ``not_applicable``, ``needs_seeds``, ``edge_leaves_window``, ``annulus_leaves_window``,
-        ``out_of_reach``, ``below_reference_floor``, ``not_installed`` (extras say how to).
+        ``undefined_no_direction``, ``undefined_uniform_error``, ``undefined_too_few_phases``, ``undefined_no_edge``,
+        ``undefined_no_crossing``, ``below_resolution``, ``not_applicable``, ``needs_seeds``, ``edge_leaves_window``,
+        ``annulus_leaves_window``, ``out_of_reach``, ``below_reference_floor``, ``not_installed`` (extras say how to).
     extras : mapping
         Further figures and what they depend on; JSON serialisable.
     """
@@ -59,7 +59,7 @@ class Metric:
         The direction of improvement; "zero" is signed, "truth" is better the nearer to the scene's own figure.
     needs : tuple of str
         "reference" (it measures error), "frames" and "seeds" (two or more of them), "centers" (further sequences), or
-        a fact of the scene.
+        a fact of the scene; "patterns" are rotors, or gratings that a pan moves.
     compute : callable
         Takes the gated signals, returns the score.
     source : str

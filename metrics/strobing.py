@@ -1,9 +1,10 @@
-"""Strobing: a rotor that seems to turn at another rate, backwards, or not at all (the wagon wheel).
+"""Strobing: a rotor that seems to turn at another rate, backwards, or not at all: the wagon wheel.
 
 A blade pattern is a sum of angular orders; order m turns past a fixed point m times a revolution, and is aliased in
 time when that is half the frame rate or more. STROBE_abs is the share of the pattern that is still visible and aliased:
 a property of the shutter, which a perfect renderer does not score 0 on. STROBE_err compares with the same shutter
-rendered exactly. After Watson, Ahumada and Farrell 1986 (the window of visibility).
+rendered exactly. After Watson, Ahumada and Farrell 1986 (the window of visibility). Gratings that a pan moves are
+patterns of the same kind (see `translation`).
 """
 
 from dataclasses import asdict, dataclass
@@ -15,6 +16,7 @@ from aliasbench.metrics.gate import Signals
 from aliasbench.metrics.orders import Orders, is_aliased, measure_orders, noise_power, sharp_power
 from aliasbench.metrics.score import Score, rms, settle
 from aliasbench.metrics.sharpness import sharpness
+from aliasbench.metrics.translation import grating_errors, grating_shares
 from aliasbench.scenes.model import FloatArray
 
 # Below this share of the duty an order is not there, and has no rate.
@@ -76,31 +78,47 @@ def _measure_all(signals: Signals, picture: FloatArray) -> list[Orders] | Score:
 
 
 def compute_strobing(signals: Signals) -> Score:
-    """Return STROBE_abs in [0, 1]: the root of the visible aliased share; quadratic mean over rotors.
+    """Return STROBE_abs in [0, 1]: the root of the visible aliased share; quadratic mean over rotors and gratings.
 
-    Extras: the sharpness, with the share of the sharp pattern's power that is left (the mean over rotors).
+    Extras: the sharpness, with the share of the sharp patterns' power that is left (the mean over them).
     """
     rotors = _all_orders(signals, "test")
     if isinstance(rotors, Score):
         return rotors
-    shares, extras = zip(*(strobe_share(o, signals.scene.animation.fps) for o in rotors), strict=True)
-    kept = {**sharpness(signals), "modulation_kept": np.mean([e["modulation_kept"] for e in extras])}
-    return Score(rms(np.sqrt(np.array(shares))), "ok", {"rotors": list(extras), "sharpness": kept})
+    gratings = grating_shares(signals)
+    if isinstance(gratings, Score):
+        if not rotors:
+            return gratings
+        gratings = []
+    turning = [strobe_share(o, signals.scene.animation.fps) for o in rotors]
+    extras = {"rotors": [e for _, e in turning], "gratings": [e for _, e in gratings]}
+    shown: dict[str, object] = {name: given for name, given in extras.items() if given}
+    kept = {**sharpness(signals), "modulation_kept": np.mean([e["modulation_kept"] for _, e in (*turning, *gratings)])}
+    shares = np.array([share for share, _ in (*turning, *gratings)])
+    return Score(rms(np.sqrt(shares)), "ok", {**shown, "sharpness": kept})
 
 
 def compute_strobing_err(signals: Signals) -> Score:
-    """Return STROBE_err: the RMS difference of all resolved orders from the reference's, per sharp pattern's RMS."""
+    """Return STROBE_err: the RMS difference of all resolved orders and lines from the reference's, per sharp RMS."""
     rotors = _all_orders(signals, "error")
     if isinstance(rotors, Score):
         return rotors
-    values, floors = [], []
+    gratings = grating_errors(signals)
+    if isinstance(gratings, Score):
+        if not rotors:
+            return gratings
+        gratings = []
+    values, totals = [], []
     for orders in rotors:
         count = orders.coefficients.shape[-1]
-        total = np.sqrt(orders.rotor.duty * (1.0 - orders.rotor.duty))
-        values.append(rms(np.abs(orders.coefficients)) * np.sqrt(2.0 * count) / total)
-        floors.append(signals.floor / total)
-    extras = {"highest_order": [o.coefficients.shape[-1] for o in rotors], "rotors": values}
-    return settle(rms(np.array(values)), extras, floor=max(floors))
+        totals.append(float(np.sqrt(orders.rotor.duty * (1.0 - orders.rotor.duty))))
+        values.append(rms(np.abs(orders.coefficients)) * np.sqrt(2.0 * count) / totals[-1])
+    extras: dict[str, object] = {"highest_order": [o.coefficients.shape[-1] for o in rotors], "rotors": list(values)}
+    if gratings:
+        extras["gratings"] = [value for value, _ in gratings]
+    values += [value for value, _ in gratings]
+    totals += [total for _, total in gratings]
+    return settle(rms(np.array(values)), extras, floor=signals.floor / min(totals))
 
 
 @dataclass(frozen=True, slots=True)

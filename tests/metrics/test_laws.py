@@ -10,7 +10,7 @@ import pytest
 from aliasbench.metrics import catalog
 from aliasbench.metrics.catalog import METRICS, PLANNED
 from aliasbench.metrics.gate import Centers
-from aliasbench.scenes.model import Animation, Facts, PanFact, RotorFact, Scene
+from aliasbench.scenes.model import Animation, Facts, GratingFact, PanFact, RotorFact, Scene
 
 SIDE, FRAMES, SEEDS = 64, 4, 8
 # The names that the documentation promises.
@@ -34,6 +34,7 @@ DOCUMENTED = [
     "strobing",
     "strobing_err",
     "apparent_rate",
+    "apparent_velocity",
     "noise",
     "structure",
     "bias",
@@ -63,6 +64,7 @@ def full_scene(make_scene, edge_fact) -> Scene:
     facts = Facts(
         edges=(edge_fact((SIDE, SIDE), (-9.0, 20.3), (80.0, 26.9)),),
         rotors=(RotorFact((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 3, 0.5, 7.0, 8.0, 28.0),),
+        gratings=(GratingFact((0.3, 0.1)),),
         pans=(PanFact((15.0, 0.0, 0.0), FRAMES / 30.0),),
     )
     return make_scene((SIDE, SIDE), facts=facts, animation=Animation(30.0, FRAMES, 0.0))
