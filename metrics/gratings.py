@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aliasbench.metrics.gate import LUMINANCE, Signals
-from aliasbench.metrics.moire import known_frequencies
 from aliasbench.metrics.shimmer import pan_px_per_frame
+from aliasbench.metrics.spectrum import known_frequencies
 from aliasbench.scenes.model import FloatArray, Grating, GratingFact, ImageTexture, PanFact, Scene, Surface
 
 # Harmonics of a profile that are counted; those of a square wave beyond have 1e-4 of its power.

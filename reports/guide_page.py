@@ -12,17 +12,23 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from aliasbench.bench.truth import Reference, crop_radius, reference_technique, render_reference
+from aliasbench.bench.centers import center_frames, center_technique, center_truth, full_truth, own_truth, truths_of
+from aliasbench.bench.quality import render_frames
+from aliasbench.bench.suite import Case
+from aliasbench.bench.truth import Reference, crop_radius, render_reference
 from aliasbench.bench.whole_files import make_folder, write_files
 from aliasbench.metrics.catalog import METRICS, find_metric, measure
+from aliasbench.metrics.gate import Centers
 from aliasbench.metrics.guide import GUIDE, NOTATION, Guide
 from aliasbench.metrics.score import Metric, Score
 from aliasbench.renderers import catalog
+from aliasbench.renderers.technique import Technique
 from aliasbench.reports.charts import number
 from aliasbench.reports.figures import Picture, encode_film, encode_picture
 from aliasbench.reports.guide_pairs import PAIRS, Pair, Shot
 from aliasbench.reports.markup import make_environment
 from aliasbench.scenes.files import load_scene
+from aliasbench.scenes.model import Scene
 
 SHOWN_SIDE = 320  # CSS pixels of a picture's side: a whole number for each pixel
 BETTER_WORDS = {
@@ -68,6 +74,7 @@ class _Take:
     test: NDArray[np.float32]
     truth: Reference
     radius_px: float
+    centers: Centers | None
 
 
 def write_guide(
@@ -98,7 +105,7 @@ def write_guide(
 
 def draw_sections(chosen: Sequence[Metric], on_step: Callable[[str], None] = lambda _: None) -> list[MetricSection]:
     """Return the metrics' sections, their pairs rendered and measured."""
-    takes: dict[tuple[Shot, int, int, int], _Take] = {}
+    takes: dict[tuple[Shot, int, int, int, bool], _Take] = {}
     sections = []
     for place, metric in enumerate(chosen):
         pair = PAIRS.get(metric.name)
@@ -107,9 +114,10 @@ def draw_sections(chosen: Sequence[Metric], on_step: Callable[[str], None] = lam
             assert pair is not None
             shot = pair.low if which == "low" else pair.high
             on_step(f"[{place}/{len(chosen)}] {metric.name}: {shot.scene} by {shot.technique}")
-            key = (shot, pair.side, pair.frames, pair.seeds)
+            split = "centers" in metric.needs
+            key = (shot, pair.side, pair.frames, pair.seeds, split)
             if key not in takes:
-                takes[key] = _take(shot, pair)
+                takes[key] = _take(shot, pair, split)
             shots.append(_show(metric, pair, shot, takes[key], which == better_shot(metric)))
         sections.append(MetricSection(metric, GUIDE[metric.name], BETTER_WORDS[metric.better], pair, shots))
     return sections
@@ -120,16 +128,31 @@ def better_shot(metric: Metric) -> str:
     return "low" if metric.better in ("lower", "zero") else "high"
 
 
-def _take(shot: Shot, pair: Pair) -> _Take:
+def _take(shot: Shot, pair: Pair, split: bool) -> _Take:
+    """Render a shot and its truth; with `split` also what tells errors in space from errors in time."""
     scene, technique = load_scene(shot.scene), catalog.resolve_technique(shot.technique)
-    size = (pair.side, pair.side)
-    with catalog.prepare(scene, technique, size=size) as prepared:
-        test = [
-            [np.asarray(prepared.render(frame=n, seed=seed).pixels, np.float32) for n in range(pair.frames)]
-            for seed in range(pair.seeds)
-        ]
-    truth = render_reference(scene, reference_technique(technique, "point"), size, pair.frames, lambda: None)
-    return _Take(np.array(test), truth, crop_radius(technique))
+    size, seeds = (pair.side, pair.side), tuple(range(pair.seeds))
+    names = ("spatial", "temporal", "shutter") if split else ()
+    case = Case("", scene, technique, size, pair.frames, seeds, 1, names, "point")
+    own = own_truth(case)
+    rendered = [_rendered(scene, technique, case)]
+    truths = {t.name: render_reference(t.scene, t.technique, size, t.frames, lambda: None) for t in truths_of(case)}
+    truth, centers = truths[own.name], None
+    middle, full = center_truth(case), full_truth(case)
+    if middle is not None and full is not None:
+        if center_frames(case):
+            rendered.append(_rendered(scene, center_technique(case), case))
+        at_center, whole = truths[middle.name], truths[full.name]
+        bounds = (at_center.uncertainty or 0.0, whole.uncertainty or 0.0)
+        centers = Centers(rendered[-1], at_center.pixels, whole.pixels, *bounds)
+    return _Take(rendered[0], truth, crop_radius(technique), centers)
+
+
+def _rendered(scene: Scene, technique: Technique, case: Case) -> NDArray[np.float32]:
+    """Return (seeds, frames, h, w, 3)."""
+    with catalog.prepare(scene, technique, size=case.size) as prepared:
+        pictures, _ = render_frames(case, prepared, lambda: None)
+    return pictures if pictures.ndim == 5 else pictures[None]
 
 
 def _show(metric: Metric, pair: Pair, shot: Shot, take: _Take, better: bool) -> ShownShot:
@@ -141,6 +164,7 @@ def _show(metric: Metric, pair: Pair, shot: Shot, take: _Take, better: bool) -> 
         scene=scene,
         filter_radius_px=take.radius_px,
         reference_uncertainty=take.truth.uncertainty or 0.0,
+        centers=take.centers,
     )
     exposure = 1.0 / scene.contrast if scene.contrast > 1.0 else 1.0
     still = encode_picture(take.test[0, 0], exposure)
