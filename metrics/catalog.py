@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from aliasbench.metrics import (
     bias,
     error,
+    gaps,
     jaggies,
     moire,
     mtf,
@@ -118,6 +119,7 @@ METRICS: Mapping[str, Metric] = {
             moire.compute_moire_peak,
             "Fisher 1929",
         ),
+        Metric("gaps", "gaps", "px", "lower", ("reference",), gaps.compute_gaps, "definition"),
         Metric("strobing", "strobing (STROBE_abs)", "1", "lower", ("patterns",), strobing.compute_strobing, _WATSON),
         Metric(
             "strobing_err",

@@ -31,6 +31,7 @@ DOCUMENTED = [
     "flux_flicker",
     "moire",
     "moire_peak",
+    "gaps",
     "strobing",
     "strobing_err",
     "apparent_rate",
