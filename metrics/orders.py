@@ -124,11 +124,12 @@ def measure_orders(signals: Signals, picture: FloatArray, rotor: RotorFact) -> O
 def noise_power(orders: Orders) -> float:
     """Return |c|^2 that noise leaves in every order, from the orders that no blade pattern has.
 
-    The median over ln 2 is the mean of exponentially distributed powers, and ignores single lines.
+    The median over ln 2 is the mean of exponentially distributed powers, and ignores single lines. It is taken of each
+    picture's own orders: of their means over pictures, which are spread less, the median is nearer to the mean.
     """
     order = np.arange(1, orders.coefficients.shape[-1] + 1)
     other = order % orders.rotor.blades != 0
     if not other.any():
         return 0.0
-    power = np.mean(np.abs(orders.coefficients[..., other]) ** 2, axis=(0, 1))
-    return float(np.median(power) / np.log(2.0))
+    power = np.abs(orders.coefficients[..., other]) ** 2
+    return float(np.mean(np.median(power, axis=-1)) / np.log(2.0))

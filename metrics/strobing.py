@@ -22,6 +22,7 @@ from aliasbench.scenes.model import FloatArray
 # Below this share of the duty an order is not there, and has no rate.
 NO_MODULATION = 1e-6
 AT_NYQUIST = 1e-6
+NOISE_DEVIATIONS = 5.0
 SERIES_TERMS = 100_000
 
 
@@ -131,6 +132,8 @@ class OrderRate:
     size : float
         |c_m|, in units of the contrast.
     aliased : bool
+    above_noise : bool
+        Whether there is more of it than noise of the strength of the other orders would leave.
     rev_per_s : float or None
         In [-fps / 2m, fps / 2m); None for an order that is not there.
     sign : int or None
@@ -140,28 +143,36 @@ class OrderRate:
     m: int
     size: float
     aliased: bool
+    above_noise: bool
     rev_per_s: float | None = None
     sign: int | None = None
 
 
 def apparent_rates(orders: Orders, fps: float) -> list[OrderRate]:
-    """Return the apparent rate of every resolved multiple of the blade count."""
+    """Return the apparent rate of every resolved multiple of the blade count.
+
+    Of what noise leaves in an order the rate is a number too, but any number; whether there is more than noise is said
+    beside it: the mean of n powers of noise is spread by 1 / sqrt n of itself, of which five are a bound.
+    """
     out = []
     rotor = orders.rotor
+    pictures = orders.coefficients.shape[0] * orders.coefficients.shape[1]
+    noise = np.sqrt(noise_power(orders) * (1.0 + NOISE_DEVIATIONS / np.sqrt(pictures)))
     for k, c in zip(orders.harmonics, np.moveaxis(orders.blade_coefficients, -1, 0), strict=True):
         m = int(k) * rotor.blades
         size = rms(np.abs(c))
         aliased = bool(is_aliased(rotor, fps, np.array([k]))[0])
+        above_noise = size > noise
         if not NO_MODULATION * rotor.duty <= size < np.inf:
-            out.append(OrderRate(m, size, aliased))
+            out.append(OrderRate(m, size, aliased, above_noise))
             continue
         phasor = c / size
         turn = -float(np.angle(np.sum(phasor[:, 1:] * np.conj(phasor[:, :-1])))) / (2.0 * np.pi)
         if 0.5 - abs(turn) < AT_NYQUIST:
-            out.append(OrderRate(m, size, aliased, -0.5 * fps / m))
+            out.append(OrderRate(m, size, aliased, above_noise, -0.5 * fps / m))
             continue
         sign = 0 if abs(turn) < AT_NYQUIST else int(np.sign(turn))
-        out.append(OrderRate(m, size, aliased, turn * fps / m, sign))
+        out.append(OrderRate(m, size, aliased, above_noise, turn * fps / m, sign))
     return out
 
 

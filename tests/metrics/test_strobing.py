@@ -8,8 +8,8 @@ import pytest
 
 from aliasbench.metrics.catalog import measure
 from aliasbench.metrics.gate import Signals, open_gate
-from aliasbench.metrics.orders import angular_orders, measure_orders
-from aliasbench.metrics.rotors import Annulus
+from aliasbench.metrics.orders import angular_orders, measure_orders, noise_power
+from aliasbench.metrics.rotors import Annulus, annulus_at
 from aliasbench.scenes.model import Animation, Camera, Facts, Scene
 from aliasbench.scenes.projection import view_at
 
@@ -134,6 +134,37 @@ def test_noise_is_not_strobing(rotor_scene, rotor_frames, rgb):
     assert noise.value**2 == pytest.approx(0.5 * 0.5 / samples, rel=0.02)
     assert noise.value**2 == pytest.approx(0.015625, rel=0.02)
     assert measure("strobing", rgb(test), rgb(truth), scene=scene).value < 0.01
+
+
+def test_what_noise_leaves_in_an_order_is_known_from_the_other_orders(rotor_scene, rgb):
+    scene, rotor = rotor_scene(160, 3, 29.0, frames=16)
+    noise = np.random.default_rng(4).normal(size=(16, 160, 160))
+    gate = open_gate(rgb(noise), rgb(np.zeros_like(noise)), scene=scene)
+    assert isinstance(gate, Signals)
+    orders = measure_orders(gate, gate.test, rotor)
+    assert not isinstance(orders, str)
+    annulus = annulus_at(rotor, gate, 0)
+    assert not isinstance(annulus, str)
+    count = orders.coefficients.shape[-1] * 2 / 3
+    # White noise of variance 1 leaves sum w^2. A median of n exponentials is spread by 1 / sqrt n, and its mean is
+    # 1 / (2 n) above ln 2; 16 pictures, five standard deviations.
+    bound = (5 / math.sqrt(16 * count) + 1 / (2 * count)) / math.log(2)
+    assert noise_power(orders) == pytest.approx(np.sum(annulus.weight**2), rel=bound)
+
+
+def test_rates_of_noise_are_said_to_be_noise(rotor_scene, rotor_frames, rgb):
+    scene, rotor = rotor_scene(SIDE, 3, 30.0, frames=6, shutter=1.0)
+    blurred = rotor_frames(rotor, SIDE, scene.animation)
+    noise = 0.1 * np.random.default_rng(5).normal(size=blurred.shape)
+
+    def first(picture):
+        score = measure("apparent_rate", rgb(picture), rgb(blurred), scene=scene)
+        return score.extras["rotors"][0]["orders"][0]
+
+    assert first(blurred + noise)["above_noise"] is False
+    standing = rotor_frames(rotor, SIDE, replace(scene.animation, shutter=0.0))
+    # Noise of .1 leaves .1 sqrt(sum w^2) of some .1 / 100, a blade pattern of .02 its first order's third.
+    assert first(blurred + 0.02 * standing + noise)["above_noise"] is True
 
 
 def test_the_renderers_own_strobing_is_the_difference_from_its_shutter(rotor_scene, rotor_frames, rgb):
