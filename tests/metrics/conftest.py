@@ -1,12 +1,16 @@
 """Signals with known answers: scenes whose world units are pixels, exact edges, pans and rotors, as fixtures."""
 
+import sys
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from aliasbench.scenes.model import Animation, Camera, EdgeFact, Facts, RotorFact, Scene, Surface, Vec3
+
+sys.path.append(str(Path(__file__).parent))  # where planted signals are
 
 FloatArray = NDArray[np.float64]
 MakeScene = Callable[..., Scene]
