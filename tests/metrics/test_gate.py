@@ -19,7 +19,7 @@ def scene(make_scene) -> Scene:
     return make_scene((10, 12))
 
 
-@pytest.mark.parametrize("dtype", [np.uint8, np.int64, np.bool_])
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.int64, np.bool_, np.complex128, np.object_])
 def test_pixels_without_a_scale_raise(scene, dtype):
     with pytest.raises(ValueError, match=rf"test: pixels of type {np.dtype(dtype)} have no known scale"):
         measure("rmse", np.zeros(SHAPE, dtype), np.zeros(SHAPE), scene=scene)
@@ -44,6 +44,17 @@ def test_empty_pictures_raise(scene, shape):
         measure("rmse", np.zeros(shape), np.zeros(shape), scene=scene)
 
 
+def test_no_seeds_are_no_pixels(scene):
+    with pytest.raises(ValueError, match=r"test: shape \(0, 2, 12, 10, 3\) holds no pixels"):
+        measure("noise", np.zeros((0, *SHAPE)), np.zeros(SHAPE), scene=scene)
+
+
+@pytest.mark.parametrize("contrast", [None, "1"])
+def test_a_contrast_that_is_no_number_is_a_bug_of_the_caller(make_scene, contrast):
+    with pytest.raises(TypeError, match="must be real number"):
+        measure("rmse", np.zeros(SHAPE), np.zeros(SHAPE), scene=make_scene((10, 12), contrast=contrast))
+
+
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
 def test_a_reference_that_is_not_finite_raises(scene, bad):
     reference = np.zeros(SHAPE)
@@ -60,7 +71,7 @@ def test_radius_and_uncertainty_must_be_finite_and_not_negative(scene, name, num
 
 
 @pytest.mark.parametrize("name", METRICS)
-@pytest.mark.parametrize("bad", [math.nan, math.inf])
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
 def test_a_picture_that_is_not_finite_is_reported_with_its_place(scene, name, bad):
     test = np.zeros((2, *SHAPE))
     test[1, 0, 11, 9, 2] = test[1, 1, 0, 0, 0] = bad  # in the border too
