@@ -82,7 +82,7 @@ def split_blur(test: FloatArray, reference: FloatArray) -> BlurSplit | None:
         return None
     change = np.linalg.solve(normal + RIDGE * np.eye(TAPS**2), right)
     blur_square = float(change @ normal @ change)
-    residual_square = error_square / pixels - offset**2 - 2.0 * float(change @ right) + blur_square
+    residual_square = error_square / pixels - offset * offset - 2.0 * float(change @ right) + blur_square
     # An offset of the window is one of the kernel the other way round.
     kernel = change.reshape(TAPS, TAPS)[::-1, ::-1].copy()
     kernel[REACH, REACH] += 1.0

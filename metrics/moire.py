@@ -82,7 +82,7 @@ def compute_moire_peak(signals: Signals) -> Score:
     share = float(np.sum(relative**2))
     extras: dict[str, object] = {"size": size, **describe_blocks(signals, np.sum(magnitude**2, axis=-1))}
     status = "windowed" if spectrum.windowed else "ok"
-    if largest**2 * share < NOTHING:
+    if largest * largest * share < NOTHING:
         return settle(
             0.0, extras | {"cycles_per_px": None, "period_px": None}, floor=2.0 * signals.floor, status=status
         )

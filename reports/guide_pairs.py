@@ -177,7 +177,7 @@ PAIRS: Mapping[str, Pair] = MappingProxyType(
         ),
         "apparent_velocity": Pair(
             Shot("grid:lines=155,speed=2", POINT),
-            Shot("grid:lines=10,speed=2", POINT),
+            Shot("grid:lines=11,speed=2", POINT),
             "Both move to the right. The left one is finer than the pixels: a false grid moves to the left.",
             frames=15,
         ),

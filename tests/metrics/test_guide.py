@@ -14,7 +14,7 @@ from aliasbench.metrics.guide import GUIDE, NOTATION, Guide
 from aliasbench.scenes.model import FloatArray
 
 # Described before they can be measured.
-SOON = {"gaps"}
+SOON: set[str] = set()
 SENTENCES = [f.name for f in fields(Guide) if f.name != "formula"]
 DECIMAL = re.compile(r"\d+\.\d+")
 # Decimals that are assumptions of the figure beside them, not results: widths, deviations, shares, errors.
