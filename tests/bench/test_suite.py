@@ -7,8 +7,7 @@ import pytest
 
 from aliasbench.bench.suite import Request, plan_run
 from aliasbench.bench.suite_file import SUITES, Group, parse_suite, read_suite
-from aliasbench.metrics.catalog import PLANNED
-from aliasbench.scenes.errors import InputError, NotAvailableError
+from aliasbench.scenes.errors import InputError
 
 SMALL = """
 schema = 1
@@ -183,12 +182,6 @@ def test_a_wrong_suite_says_where_what_and_what_is_allowed(text: str, sentence: 
 def test_a_suite_says_what_is_missing(text: str, sentence: str) -> None:
     with pytest.raises(InputError, match=sentence):
         parse_suite(text, "S", None, "s")
-
-
-@pytest.mark.parametrize("name", PLANNED)
-def test_a_metric_that_is_planned_is_not_available(name: str) -> None:
-    with pytest.raises((InputError, NotAvailableError), match=rf"S: metrics = \['{name}'\]: .*not available"):
-        parse_suite(f"schema = 1\nmetrics = ['{name}']", "S", None, "s")
 
 
 def test_a_suite_may_name_metrics_that_are_not_measured_by_default() -> None:

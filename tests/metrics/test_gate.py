@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from aliasbench.metrics.catalog import METRICS, PLANNED, measure, measure_all
+from aliasbench.metrics.catalog import METRICS, measure, measure_all
 from aliasbench.metrics.gate import Signals, open_gate
 from aliasbench.metrics.score import Score, finish, rms, sanitize
-from aliasbench.scenes.errors import InputError, NotAvailableError
+from aliasbench.scenes.errors import InputError
 from aliasbench.scenes.model import Scene
 
 SHAPE = (2, 12, 10, 3)
@@ -162,14 +162,6 @@ def test_no_score_stands_below_three_times_the_references_uncertainty(scene, nam
 def test_unknown_names_say_what_was_probably_meant(scene):
     with pytest.raises(InputError, match=r"unknown metric 'shimer'; did you mean 'shimmer'\? known: .*ssim"):
         measure("shimer", np.zeros(SHAPE), np.zeros(SHAPE), scene=scene)
-
-
-@pytest.mark.parametrize("name", PLANNED)
-def test_documented_metrics_that_do_not_exist_yet_say_so(scene, name):
-    with pytest.raises(
-        NotAvailableError, match=rf"metric '{name}' is not available in this version; available: apparent_rate"
-    ):
-        measure(name, np.zeros(SHAPE), np.zeros(SHAPE), scene=scene)
 
 
 def test_rms_does_not_overflow_or_underflow():
