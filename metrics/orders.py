@@ -9,13 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import fft, sparse
 
-from aliasbench.metrics.gate import Signals
-from aliasbench.metrics.rotors import Annulus, annulus_at
+from aliasbench.metrics.gate import Signals, each_frame
+from aliasbench.metrics.rotors import Annulus, annulus_at, stays
 from aliasbench.scenes.model import FloatArray, RotorFact
 
 HIGHEST_HARMONIC = 48
 BINS_PER_CYCLE = 64
 MOMENTS = 6
+FEW_PICTURES = 8
 
 ComplexArray = np.ndarray[tuple[int, ...], np.dtype[np.complex128]]
 
@@ -80,16 +81,21 @@ def angular_orders(values: FloatArray, annulus: Annulus, highest: int) -> Comple
     nearest = np.rint(annulus.angle / step)
     offset = annulus.angle - nearest * step
     place = nearest.astype(np.int64) % bins
-    order = np.argsort(place, kind="stable")
-    starts = np.searchsorted(place[order], np.arange(bins + 1))
-    columns = np.ascontiguousarray(values.T)
+    few = values.shape[0] <= FEW_PICTURES
+    if not few:
+        order = np.argsort(place, kind="stable")
+        starts = np.searchsorted(place[order], np.arange(bins + 1))
+        columns = np.ascontiguousarray(values.T)
     m = np.arange(1, highest + 1)
     out = np.zeros((values.shape[0], highest), dtype=np.complex128)
     weight = annulus.weight
     factor: ComplexArray = np.ones(highest, dtype=np.complex128)
     for moment in range(MOMENTS):
-        collect = sparse.csr_array((weight[order], order, starts), shape=(bins, order.size))
-        collected: FloatArray = np.asarray(collect @ columns)
+        if few:  # then making the matrix costs more than it spares
+            collected = np.stack([np.bincount(place, weight * row, bins) for row in values], axis=1)
+        else:
+            collect = sparse.csr_array((weight[order], order, starts), shape=(bins, order.size))
+            collected = np.asarray(collect @ columns)
         out += (fft.rfft(collected, axis=0)[1 : highest + 1] * factor[:, None]).T
         weight = weight * offset
         factor *= -1j * m / (moment + 1)
@@ -97,27 +103,33 @@ def angular_orders(values: FloatArray, annulus: Annulus, highest: int) -> Comple
 
 
 def measure_orders(signals: Signals, picture: FloatArray, rotor: RotorFact) -> Orders | str:
-    """Return the orders of a rotor in a sequence (seeds, frames, h, w), or the status that says why there are none."""
+    """Return the orders of a rotor in a sequence (n, frames, h, w), or the status that says why there are none."""
     scene = signals.scene
-    seeds, frames = picture.shape[:2]
+    count, frames = picture.shape[:2]
     if not (rotor.blades >= 1 and 0.0 < rotor.duty < 1.0 and 0.0 <= rotor.inner < rotor.outer):
         return "not_applicable"
-    fixed = scene.camera.is_static and all(
-        o.motion.matrices is None and o.motion.velocity == (0.0, 0.0, 0.0) for o in scene.objects
-    )
-    flat = picture.reshape(seeds, frames, -1)
-    parts: list[ComplexArray] = []
-    highest = 0
-    for index in range(1 if fixed else frames):
-        annulus = annulus_at(rotor, signals, index + signals.frame_start)
+    first = annulus_at(rotor, signals, signals.frame_start)
+    if isinstance(first, str):
+        return first
+    highest = highest_order(rotor, first, scene.animation.fps)
+
+    def orders_in(annulus: Annulus | str, part: slice) -> ComplexArray | str:
         if isinstance(annulus, str):
             return annulus
         if annulus.inner_px < 4.0 * rotor.blades / np.pi:
             return "undefined_too_small"
-        highest = highest or highest_order(rotor, annulus, scene.animation.fps)
-        own = flat[:, :, annulus.index] if fixed else flat[:, index : index + 1, annulus.index]
-        orders = angular_orders(own.reshape(-1, annulus.index.size), annulus, highest)
-        parts.append(orders.reshape(seeds, -1, highest))
+        own = picture[:, part].reshape(count, -1, picture.shape[2] * picture.shape[3])[:, :, annulus.index]
+        return angular_orders(own.reshape(-1, annulus.index.size), annulus, highest).reshape(count, -1, highest)
+
+    def orders_of(frame: int) -> ComplexArray | str:
+        return orders_in(annulus_at(rotor, signals, frame + signals.frame_start), slice(frame, frame + 1))
+
+    found = [orders_in(first, slice(None))] if stays(rotor, scene) else each_frame(orders_of, frames)
+    parts = []
+    for part in found:
+        if isinstance(part, str):
+            return part
+        parts.append(part)
     return Orders(rotor, np.concatenate(parts, axis=1))
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from aliasbench.metrics.gate import Signals
-from aliasbench.scenes.model import FloatArray, RotorFact
+from aliasbench.scenes.model import FloatArray, RotorFact, Scene, Surface
 from aliasbench.scenes.motion import object_matrix
 from aliasbench.scenes.projection import View, view_at
 
@@ -51,15 +51,29 @@ def plane_axes(axis: FloatArray) -> tuple[FloatArray, FloatArray]:
     return first, np.cross(axis, first)
 
 
+def carrier_of(rotor: RotorFact, scene: Scene) -> Surface | None:
+    """Return the object that spins about the rotor's centre, with which it moves; None for a rotor that stays."""
+    for surface in scene.objects:
+        spin = surface.motion.spin
+        if spin is not None and np.allclose(spin.center, rotor.center, rtol=0.0, atol=1e-9 * rotor.outer):
+            return surface
+    return None
+
+
+def stays(rotor: RotorFact, scene: Scene) -> bool:
+    """Return whether the rotor's centre is at the same place of the picture in all frames."""
+    carrier = carrier_of(rotor, scene)
+    return scene.camera.is_static and (carrier is None or carrier.motion.velocity == (0.0, 0.0, 0.0))
+
+
 def hub_at(rotor: RotorFact, signals: Signals, frame: int, fraction: float) -> FloatArray:
     """Return the rotor's centre (3,) at a time: it moves with the object that spins about it."""
     center = np.asarray(rotor.center, dtype=np.float64)
-    for surface in signals.scene.objects:
-        spin = surface.motion.spin
-        if spin is not None and np.allclose(spin.center, center, rtol=0.0, atol=1e-9 * rotor.outer):
-            matrix = object_matrix(surface.motion, signals.scene.animation, frame, fraction)
-            return matrix[:3, :3] @ center + matrix[:3, 3]
-    return center
+    carrier = carrier_of(rotor, signals.scene)
+    if carrier is None:
+        return center
+    matrix = object_matrix(carrier.motion, signals.scene.animation, frame, fraction)
+    return matrix[:3, :3] @ center + matrix[:3, 3]
 
 
 def annulus_at(rotor: RotorFact, signals: Signals, frame: int) -> Annulus | str:
