@@ -43,7 +43,7 @@ def _filters() -> Rows:
 def _metrics() -> Rows:
     from aliasbench.metrics.catalog import METRICS, OPTIONAL
     from aliasbench.metrics.guide import GUIDE
-    from aliasbench.metrics.score import Metric
+    from aliasbench.metrics.score import NEEDS, Metric
 
     def summary(m: Metric) -> str:
         return (
@@ -56,7 +56,7 @@ def _metrics() -> Rows:
             "summary": summary(m),
             "unit": m.unit,
             "better": m.better,
-            "guide": {**asdict(GUIDE[m.name]), "needs": ", ".join(m.needs), "source": m.source},
+            "guide": {**asdict(GUIDE[m.name]), "needs": "; ".join(NEEDS[need] for need in m.needs), "source": m.source},
         }
         for m in (*METRICS.values(), *OPTIONAL.values())
     ]

@@ -51,7 +51,7 @@ def compute_relmse(signals: Signals) -> Score:
         return rms(signals.error[:, frame] * inverse), rms(inverse)
 
     value, floor = (np.square(rms(each)) for each in np.array(each_frame(relative, signals.frames)).T)
-    return settle(float(value), {"epsilon": RELATIVE_FLOOR**2}, floor=float(floor) * signals.floor**2)
+    return settle(float(value), {"epsilon": RELATIVE_FLOOR**2}, floor=float(floor) * signals.floor * signals.floor)
 
 
 def compute_max_error(signals: Signals) -> Score:

@@ -9,6 +9,7 @@ import math
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
+from numbers import Integral, Real
 from typing import TypeVar, cast
 
 import numpy as np
@@ -191,6 +192,8 @@ def open_gate(
         )
     _check_number("filter_radius_px", filter_radius_px)
     _check_number("reference_uncertainty", reference_uncertainty)
+    if isinstance(frame_start, bool) or not isinstance(frame_start, Integral) or frame_start < 0:
+        raise ValueError(f"frame_start {frame_start!s:.60}: must be a whole number, not negative")
     _check_finite("reference", reference)
     if centers is not None:
         _check_centers(centers, test, reference)
@@ -259,8 +262,8 @@ def _check_pixels(name: str, array: NDArray[np.floating]) -> None:
 
 
 def _check_number(name: str, number: float) -> None:
-    if not (math.isfinite(number) and number >= 0.0):
-        raise ValueError(f"{name} {number}: must be finite and not negative")
+    if isinstance(number, bool) or not isinstance(number, Real) or not (math.isfinite(number) and number >= 0.0):
+        raise ValueError(f"{name} {number!s:.60}: must be finite and not negative")
 
 
 def _check_finite(name: str, reference: NDArray[np.floating]) -> None:

@@ -76,7 +76,8 @@ def way_of_picture(pan: PanFact, scene: Scene) -> float:
     Scene files may name it either way; which, the objects tell.
     """
     velocity = np.array(pan.velocity)
-    seen = [np.subtract(surface.motion.velocity, scene.camera.velocity) for surface in scene.objects]
+    moving = [surface.motion.velocity for surface in scene.objects] or [(0.0, 0.0, 0.0)]
+    seen = [np.subtract(own, scene.camera.velocity) for own in moving]
     close = CLOSE * float(np.linalg.norm(velocity))
     with_it = any(np.linalg.norm(v - velocity) <= close for v in seen)
     against = any(np.linalg.norm(v + velocity) <= close for v in seen)

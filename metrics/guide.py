@@ -174,10 +174,10 @@ GUIDE: Mapping[str, Guide] = MappingProxyType(
             "no single one: the extras have the peaks of blocks.",
         ),
         "strobing": Guide(
-            "How much of a rotor's pattern is seen at a false speed: what is still visible of all that turns too fast "
-            "for the frame rate.",
+            "How much of a pattern that turns, or passes, is seen at a false speed: what is still visible of all that "
+            "moves too fast for the frame rate.",
             "STROBE_abs = √( Σ |c_m|² / Σ |a_m|² ), above over orders m with |m r| ≥ f/2, below over all but 0; "
-            "c_m of the picture, a_m of the sharp pattern, at r rev/s",
+            "c_m of the picture, a_m of the sharp pattern, at r rev/s; of a grating that passes, its harmonics",
             "A property of the shutter, not 0: three blades at 29 rev/s and 30 frames a second score 1 at an instant, "
             "0.196 with the shutter open for half a frame, 0.032 for a whole one.",
             "1 where every order is too fast, 0.315 for three blades at 1 rev/s, whose sharp borders are.",
@@ -185,7 +185,7 @@ GUIDE: Mapping[str, Guide] = MappingProxyType(
             "sharp and still, a score of 1.",
         ),
         "strobing_err": Guide(
-            "How far a rotor's pattern is from what the same shutter shows exactly.",
+            "How far a pattern that turns, or passes, is from what the same shutter shows exactly.",
             "STROBE_err = √( Σ mean_t |c_m(T) − c_m(R)|² / Σ |a_m|² ) over orders m ≠ 0",
             "0, with any shutter.",
             "0.969 for three blades at 29 rev/s where the shutter is open for a whole frame and almost nothing should "
@@ -281,7 +281,7 @@ GUIDE: Mapping[str, Guide] = MappingProxyType(
         ),
         "apparent_velocity": Guide(
             "How fast a regular pattern seems to move, true or not, in pixels a frame along its frequency.",
-            "v_seen = wrap(ν v) / |wrap(ν)|, wrapped into ±½, for ν cycles a pixel that move by v px a frame",
+            "v_seen = wrap(ν v) / |wrap(ν)| for ν cycles a pixel that move by v px a frame; wrap(x) = x − round(x)",
             "The same as a point sampler: an exact picture has no other directions. Blur only makes them faint.",
             "−1 px a frame for a pattern of four pixels a period that moves by 3.",
             "Patterns finer than two pixels a period are seen as coarser ones, which move at speeds of their own.",

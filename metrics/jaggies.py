@@ -7,7 +7,7 @@ in step with the edge's crossings of pixel rows is stairstepping, the rest is no
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,6 +21,7 @@ HARMONICS = 8
 # Pixels per degree of the display for which stairs are weighted by how well they are seen.
 PPD = 60.0
 FEWEST_COLUMNS = 32
+HUGE = 1e100
 # Maximum of (.0192 + f) exp(-f^1.1) over f, where 1.1 f^.1 (.0192 + f) = 1.
 SENSITIVITY_PEAK = 0.37726072
 # Relative size below which a harmonic is the same as others at this slope, and counted with them.
@@ -196,25 +197,31 @@ def compute_jaggies_str(signals: Signals) -> Score:
     if not long:
         most = max(x.window.columns.size for x in locators)
         return Score(None, "undefined_too_small", {"columns": most, "smallest": FEWEST_COLUMNS})
+    # What overflows when squared is measured in units of the largest; extras in squares are then None.
+    largest = max(float(np.max(np.abs(x.displacement))) for x in long)
+    scale = largest if largest > HUGE else 1.0
+    if scale > 1.0:
+        long = [replace(x, displacement=x.displacement / scale) for x in long]
     stairs = [split_stairs(x) for x in long]
     square = _mean(np.array([s.square for s in stairs]))
     floor = signals.floor * max(x.window.rows for x in long)
+    unit = scale * scale
     extras = {
-        "signed_square": square,
-        "rest_square": _mean(np.array([s.rest_square for s in stairs])),
-        "noise_variance": _mean(np.array([s.noise_variance for s in stairs])),
+        "signed_square": square * unit,
+        "rest_square": _mean(np.array([s.rest_square for s in stairs])) * unit,
+        "noise_variance": _mean(np.array([s.noise_variance for s in stairs])) * unit,
         "noise_from": "seeds" if signals.seeds > 1 else "residual",
-        "harmonics": np.sqrt(np.mean([s.harmonics**2 for s in stairs], axis=0)),
+        "harmonics": scale * np.sqrt(np.mean([s.harmonics**2 for s in stairs], axis=0)),
         "edges": [
-            {"edge": x.edge, "frame": x.frame, "signed_square": s.square, "rank": s.rank}
+            {"edge": x.edge, "frame": x.frame, "signed_square": s.square * unit, "rank": s.rank}
             for x, s in zip(long, stairs, strict=True)
             if x.frame == signals.frame_start
         ],
         "visible": {
-            "value": signed_root(_mean(np.array([s.visible_square for s in stairs]))),
+            "value": scale * signed_root(_mean(np.array([s.visible_square for s in stairs]))),
             "ppd": PPD,
             "sensitivity": "Mannos and Sakrison 1974",
         },
-        "crawl": crawl_of_edges(long, floor),
+        "crawl": crawl_of_edges(long, floor / scale),
     }
-    return settle(signed_root(square), extras, floor=floor)
+    return settle(scale * signed_root(square), extras, floor=floor)

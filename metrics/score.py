@@ -19,6 +19,17 @@ if TYPE_CHECKING:
 
 Better = Literal["lower", "higher", "zero", "truth"]
 Need = Literal["reference", "frames", "seeds", "edges", "rotors", "pans", "gratings", "patterns", "centers"]
+NEEDS: Mapping[Need, str] = {
+    "reference": "an exact picture to compare with",
+    "frames": "two frames or more",
+    "seeds": "two seeds or more",
+    "edges": "an edge that the scene declares",
+    "rotors": "a rotor that the scene declares",
+    "pans": "a pan that the scene declares",
+    "gratings": "a grating that the scene declares",
+    "patterns": "a rotor that the scene declares, or a grating and a pan",
+    "centers": "a moving scene, rendered at the shutter's middle too",
+}
 BLOCK = 1 << 16
 
 

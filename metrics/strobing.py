@@ -22,6 +22,7 @@ from aliasbench.scenes.model import FloatArray
 
 # Below this share of the duty an order is not there, and has no rate.
 NO_MODULATION = 1e-6
+HUGE = 1e100
 AT_NYQUIST = 1e-6
 NOISE_DEVIATIONS = 5.0
 SERIES_TERMS = 100_000
@@ -34,16 +35,16 @@ def strobe_share(orders: Orders, fps: float) -> tuple[float, dict[str, object]]:
     in closed form, and is taken to be attenuated as the last octave of the measured ones is.
     """
     rotor = orders.rotor
+    largest = float(np.max(np.abs(orders.coefficients)))
+    if largest > HUGE:  # whose square overflows: the share is cut at 1 long before
+        orders = replace(orders, coefficients=orders.coefficients * (HUGE / largest))
     k = orders.harmonics
     noise = noise_power(orders)
     power = np.mean(np.abs(orders.blade_coefficients) ** 2, axis=(0, 1)) - noise
     sharp = sharp_power(rotor, k)
     aliased = is_aliased(rotor, fps, k)
     total = rotor.duty * (1.0 - rotor.duty)
-    octave = k > k.size / 2
-    if float(np.sum(sharp[octave])) < NO_MODULATION * total:
-        octave = k > 0
-    kept = float(np.clip(np.sum(power[octave]) / np.sum(sharp[octave]), 0.0, 1.0))
+    kept = min(last_octave(power, sharp, total), 1.0)
     series = np.arange(1.0, SERIES_TERMS + 1.0)
     unmeasured = is_aliased(rotor, fps, series) & (series > k.size)
     # The terms left out of the series average half of 1 / (pi k)^2, on both sides of 0.
@@ -62,6 +63,37 @@ def strobe_share(orders: Orders, fps: float) -> tuple[float, dict[str, object]]:
         "modulation_kept": float(np.clip(left / total, 0.0, 1.0)),
     }
     return share, extras
+
+
+def last_octave(power: FloatArray, sharp: FloatArray, total: float) -> float:
+    """Return the measured power (K,) of the upper half of the harmonics per sharp pattern's: what is left beyond them.
+
+    Where the pattern has next to nothing there, of all harmonics.
+    """
+    octave = np.arange(1, power.size + 1) > power.size / 2
+    if float(np.sum(sharp[octave])) < NO_MODULATION * total:
+        octave[:] = True
+    return max(float(np.sum(power[octave]) / np.sum(sharp[octave])), 0.0)
+
+
+def rotor_error(orders: Orders) -> float:
+    """Return the RMS of all orders of an error but 0.
+
+    The blades' orders that are not resolved are taken to be off like the last octave of those that are, as far as these
+    stand out from the orders between them: an error that has nothing to do with blades has no such tail.
+    """
+    scale = float(np.max(np.abs(orders.coefficients)))
+    if scale == 0.0:
+        return 0.0
+    rotor = orders.rotor
+    total = rotor.duty * (1.0 - rotor.duty)
+    sharp = sharp_power(rotor, orders.harmonics)
+    power = np.mean(np.abs(orders.coefficients / scale) ** 2, axis=(0, 1))
+    order = np.arange(1, power.size + 1)
+    between = power[(order % rotor.blades != 0) & (order > power.size / 2)]
+    own = power[rotor.blades - 1 :: rotor.blades] - (float(np.mean(between)) if between.size else 0.0)
+    tail = last_octave(own, sharp, total) * max(total - 2.0 * float(np.sum(sharp)), 0.0)
+    return scale * float(np.sqrt(2.0 * float(np.sum(power)) + tail))
 
 
 def _all_orders(signals: Signals, which: Literal["test", "error"]) -> list[Orders] | Score:
@@ -108,7 +140,10 @@ def compute_strobing(signals: Signals) -> Score:
 
 
 def compute_strobing_err(signals: Signals) -> Score:
-    """Return STROBE_err: the RMS difference of all resolved orders and lines from the reference's, per sharp RMS."""
+    """Return STROBE_err: the RMS difference of all orders and lines from the reference's, per sharp pattern's RMS.
+
+    Orders of a rotor that the annulus does not resolve are estimated (see `rotor_error`).
+    """
     rotors = _all_orders(signals, "error")
     if isinstance(rotors, Score):
         return rotors
@@ -119,9 +154,8 @@ def compute_strobing_err(signals: Signals) -> Score:
         gratings = []
     values, totals = [], []
     for orders in rotors:
-        count = orders.coefficients.shape[-1]
         totals.append(float(np.sqrt(orders.rotor.duty * (1.0 - orders.rotor.duty))))
-        values.append(rms(np.abs(orders.coefficients)) * np.sqrt(2.0 * count) / totals[-1])
+        values.append(rotor_error(orders) / totals[-1])
     extras: dict[str, object] = {"highest_order": [o.coefficients.shape[-1] for o in rotors], "rotors": list(values)}
     if gratings:
         extras["gratings"] = [value for value, _ in gratings]
@@ -198,7 +232,7 @@ def backward_fraction(rates: list[OrderRate], rate: float) -> float | None:
     shares = power_shares(rates)
     if rate == 0.0 or not shares:
         return None
-    return sum(share * (0.5 if r.sign is None else float(r.sign != np.sign(rate))) for share, r in shares)
+    return min(sum(share * (0.5 if r.sign is None else float(r.sign != np.sign(rate))) for share, r in shares), 1.0)
 
 
 def speed_error(rates: list[OrderRate], rate: float) -> float | None:

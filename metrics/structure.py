@@ -38,7 +38,9 @@ def compute_noise(signals: Signals) -> Score:
     Extras: the blue ratio (1 white, less is better), and on static scenes the correlation of one frame's noise with the
     next's: 1 where every frame has the same seeds, 0 where each has its own.
     """
-    deviation = signals.error - np.mean(signals.error, axis=0)
+    # From the first seed, because the mean of equal numbers is not always that number.
+    deviation = signals.error - signals.error[0]
+    deviation -= np.mean(deviation, axis=0)
     value = rms(deviation) * float(np.sqrt(signals.seeds / (signals.seeds - 1)))
     extras: dict[str, object] = {
         "seeds": signals.seeds,

@@ -157,6 +157,12 @@ def _present(records: Sequence[Record], names: Iterable[str]) -> list[str]:
     return [name for name in known if name in held] + extra
 
 
+def _says(record: Record, name: str) -> bool:
+    """Return whether a record has a value of a metric, or a floor that it is below."""
+    score = record.metrics.get(name)
+    return score is not None and (score.value is not None or score.floor is not None)
+
+
 def _run_heading(runs: Sequence[str]) -> list[Heading]:
     return [Heading("run")] if len(runs) > 1 else []
 

@@ -52,7 +52,10 @@ def rotor_figures(stage: Stage, orders: NDArray[np.complex128], *, rotor: bool =
     kept = min(max(float(np.sum(power[octave]) / np.sum(sharp[octave])), 0.0), 1.0)
     tail = DUTY * (1 - DUTY) - 2 * float(np.sum(sharp))
     share = (2 * float(np.sum(power[2 * k >= stage.frames])) + kept * tail) / (DUTY * (1 - DUTY))
-    error = 2 * float(np.sum(np.mean(np.abs(orders) ** 2, axis=0))) / (DUTY * (1 - DUTY))
+    off = np.mean(np.abs(orders) ** 2, axis=0)
+    between = float(np.mean(off[(stage.orders % BLADES != 0) & (stage.orders > off.size / 2)]))
+    beyond = float(np.sum(off[BLADES - 1 :: BLADES][octave] - between) / np.sum(sharp[octave]))
+    error = (2 * float(np.sum(off)) + max(beyond, 0.0) * tail) / (DUTY * (1 - DUTY))
     first = picture[:, BLADES - 1]
     turned = -float(np.angle(np.sum(first[1:] * np.conj(first[:-1])))) * FPS / (2 * np.pi * BLADES)
     # A closed form is an integral over the annulus, and so is the noise's: sums over its pixels are within 1e-5.
@@ -96,10 +99,14 @@ def noisy_rotor_figures(stage: Stage, power: float, pictures: int) -> dict[str, 
     count = np.count_nonzero(2 * k >= stage.frames) + tail / 2 * np.count_nonzero(octave) / float(np.sum(sharp[octave]))
     spread = math.hypot(one * math.sqrt(count * 2), median * count) * 2 / total
     error = 2 * stage.highest * power / total
+    # What the last octave's orders of the blades have above the others by chance stands for a tail.
+    chance = tail / total * one * math.sqrt(1.5 * np.count_nonzero(octave)) / float(np.sum(sharp[octave]))
     return {
         "strobing": Expected(0.0, math.sqrt(DEVIATIONS * spread)),
         "strobing_err": Expected(
-            math.sqrt(error), DEVIATIONS * math.sqrt(error) / (2 * math.sqrt(stage.highest * pictures))
+            math.sqrt(error),
+            DEVIATIONS
+            * (math.sqrt(error) / (2 * math.sqrt(stage.highest * pictures)) + chance / (2 * math.sqrt(error))),
         ),
         # Phases of the first and the last picture alone are in the sum of all their differences.
         "apparent_rate": Expected(

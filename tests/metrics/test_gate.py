@@ -63,11 +63,17 @@ def test_a_reference_that_is_not_finite_raises(scene, bad):
         measure("rmse", np.zeros(SHAPE), reference, scene=scene)
 
 
-@pytest.mark.parametrize("number", [-1.0, math.nan, math.inf])
+@pytest.mark.parametrize("number", [-1.0, math.nan, math.inf, "1", None, True])
 @pytest.mark.parametrize("name", ["filter_radius_px", "reference_uncertainty"])
 def test_radius_and_uncertainty_must_be_finite_and_not_negative(scene, name, number):
     with pytest.raises(ValueError, match=rf"{name} .*: must be finite and not negative"):
         measure("rmse", np.zeros(SHAPE), np.zeros(SHAPE), scene=scene, **{name: number})
+
+
+@pytest.mark.parametrize("number", [-1, 2.5, "0", None, True])
+def test_the_first_frame_has_a_whole_number(scene, number):
+    with pytest.raises(ValueError, match=r"frame_start .*: must be a whole number, not negative"):
+        measure("rmse", np.zeros(SHAPE), np.zeros(SHAPE), scene=scene, frame_start=number)
 
 
 @pytest.mark.parametrize("name", METRICS)

@@ -173,9 +173,25 @@ def test_the_renderers_own_strobing_is_the_difference_from_its_shutter(rotor_sce
     frozen = rgb(rotor_frames(rotor, SIDE, scene.animation, 3))
     assert measure("strobing_err", truth, truth, scene=scene).value == 0.0
     score = measure("strobing_err", frozen, truth, scene=scene)
-    order = float(str(score.extras["highest_order"][0]))
-    # All of the sharp pattern but the orders above the highest, whose share is 4 / (pi^2 K) at duty one half.
-    assert score.value == pytest.approx(math.sqrt(1 - 4 / (math.pi**2 * order / 3)), abs=LATTICE)
+    # All of the sharp pattern, and what the shutter shows of it is nothing.
+    assert score.value == pytest.approx(1.0, abs=LATTICE)
+
+
+@pytest.mark.parametrize(("blades", "rate", "duty"), [(2, 29.0, 0.5), (7, -15.0, 0.35), (12, 30.0, 0.5)])
+def test_strobing_errors_do_not_depend_on_how_many_orders_are_resolved(
+    rotor_scene, rotor_frames, rgb, blades, rate, duty
+):
+    scene, rotor = rotor_scene(SIDE, blades, rate, duty=duty, frames=6, shutter=0.5)
+    instant = replace(scene.animation, shutter=0.0)
+    truth, frozen = (rotor_frames(rotor, SIDE, animation) for animation in (scene.animation, instant))
+    k = np.arange(1, 200_001)
+    sharp = (duty * np.sinc(k * duty)) ** 2
+    turn = k * blades * rate * 0.5 / 30.0
+    # The shutter opens at the instant: order k lags by half the turn while it is open.
+    off = np.abs(1.0 - np.sinc(turn) * np.exp(-1j * np.pi * turn)) ** 2
+    expected = math.sqrt(2 * float(np.sum(sharp * off)) / (duty * (1 - duty)))
+    score = measure("strobing_err", rgb(frozen), rgb(truth), scene=scene)
+    assert score.value == pytest.approx(expected, rel=2 * LATTICE)
 
 
 def test_lattice_leakage_of_the_annulus_is_below_2e_9(rotor_scene, rgb):

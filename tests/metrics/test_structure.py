@@ -137,6 +137,13 @@ def test_shimmer_of_one_seed_says_nothing_of_noise(make_scene, rgb):
     assert "structured" not in score.extras
 
 
+@pytest.mark.parametrize("seeds", [2, 3, 5, 7, 9])
+def test_equal_seeds_have_no_noise_however_their_mean_is_rounded(make_scene, rgb, seeds):
+    test = np.repeat(np.random.default_rng(10).uniform(size=(1, 2, 12, 12)), seeds, axis=0)
+    noise = measure("noise", rgb(test), rgb(np.zeros((2, 12, 12))), scene=make_scene((12, 12)))
+    assert (noise.value, noise.extras["deterministic"]) == (0.0, True)
+
+
 def test_a_deterministic_renderer_is_all_structure(make_scene, rgb):
     test = np.repeat(np.random.default_rng(4).normal(size=(1, 1, 12, 12)), 2, axis=0)
     truth = np.zeros((1, 12, 12))
