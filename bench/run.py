@@ -32,11 +32,12 @@ from aliasbench.bench.centers import (
     truths_of_all,
 )
 from aliasbench.bench.frames import write_image
+from aliasbench.bench.hard.case import verdict_outcome
 from aliasbench.bench.machine import describe_machine
 from aliasbench.bench.quality import MetricError, describe_nonfinite, measure_all, render_frames
 from aliasbench.bench.resume import check_folder, forget_lost_pictures, refuse_other_run, stored_request
 from aliasbench.bench.store import RunStore, StoredCase
-from aliasbench.bench.suite import Case, Plan, Request, plan_run
+from aliasbench.bench.suite import Case, HardCheck, Plan, Request, plan_run
 from aliasbench.bench.timing import interleaved
 from aliasbench.bench.truth import Reference, render_reference
 from aliasbench.renderers import catalog
@@ -128,12 +129,32 @@ def start_run(
     else:
         if fresh and holds_run:
             stores.remove_run(run_dir)
-        store = RunStore.create(run_dir, facts, [case.spec() for case in plan.cases])
+        store = RunStore.create(run_dir, facts, plan.specs())
     with store:
         lost = forget_lost_pictures(store)
         if lost and on_step is not None:
             on_step(Step(f"{lost} case{'s' if lost > 1 else ''} done again: pictures missing or damaged", 0, 0))
-        execute(plan.cases, store, on_step)
+        if plan.checks:
+            judge(plan.checks, store, on_step)
+        if plan.cases or not plan.checks:
+            execute(plan.cases, store, on_step)
+
+
+def judge(checks: Iterable[HardCheck], store: RunStore, on_step: OnStep | None = None) -> None:
+    """Ask what is left of the hard cases, in order, committing each verdict as soon as it is there."""
+    known = {case.spec["id"] for case in store.cases() if case.outcome is not None}
+    todo = [check for check in checks if check.id not in known]
+    progress = _Progress(len(todo), on_step)
+    for check in todo:
+        progress.say(f"{check.case.name}: {check.subject}")
+        attempt = Attempt()
+        with attempt:
+            outcome = verdict_outcome(check.case, check.case.check(check.subject))
+        if attempt.error is not None:
+            outcome = {"status": attempt.status, "error": attempt.reason}
+        store.add_outcome(check.id, outcome, trace=attempt.trace)
+        progress.advance()
+    progress.say("done" if todo else "nothing left to do")
 
 
 def execute(cases: Iterable[Case], store: RunStore, on_step: OnStep | None = None) -> None:
@@ -287,7 +308,7 @@ def _facts(request: Request, plan: Plan) -> dict[str, Any]:
     return {
         "suite": plan.name,
         "request": asdict(request),
-        "plan": hashlib.sha256(repr([case.spec() for case in plan.cases]).encode()).hexdigest(),
+        "plan": hashlib.sha256(repr(plan.specs()).encode()).hexdigest(),
         "machine": describe_machine(),
         "started": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
     }

@@ -9,6 +9,7 @@ import re
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
 
+from aliasbench.bench.hard.case import HARD_CASE, HardCase
 from aliasbench.bench.suite_file import Group, SuiteFile, read_suite
 from aliasbench.renderers.catalog import resolve_technique
 from aliasbench.renderers.technique import Technique
@@ -66,11 +67,47 @@ class Case:
 
 
 @dataclass(frozen=True, slots=True)
+class HardCheck:
+    """One hard case for one of its subjects: it is judged, not measured and timed.
+
+    `size` is what records hold; a hard case chooses its own sizes.
+    """
+
+    id: str
+    case: HardCase
+    subject: str
+    size: tuple[int, int] = (0, 0)
+
+    def spec(self) -> dict[str, object]:
+        """Return the check as records and stores hold it: the hard case's name in the scene's place."""
+        return {
+            "id": self.id,
+            "scene": self.case.name,
+            "technique": self.subject,
+            "size": list(self.size),
+            "seed": 0,
+            "seeds": [0],
+            "frames": 1,
+            "rounds": 0,
+            "metrics": [HARD_CASE],
+            "texture_truth": "point",
+        }
+
+
+@dataclass(frozen=True, slots=True)
 class Plan:
-    """The suite's name and its cases in the order they are run: those of a scene follow each other."""
+    """The suite's name and its cases in the order they are run: those of a scene follow each other.
+
+    `checks` come first.
+    """
 
     name: str
     cases: tuple[Case, ...]
+    checks: tuple[HardCheck, ...] = ()
+
+    def specs(self) -> list[dict[str, object]]:
+        """Return all of it as stores hold it."""
+        return [*(check.spec() for check in self.checks), *(case.spec() for case in self.cases)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,10 +139,26 @@ def plan_run(request: Request) -> Plan:
     """
     suite = _ad_hoc(request) if request.suite is None else read_suite(request.suite)
     cases = _expand(suite, [_overridden(group, request) for group in suite.groups])
+    checks = _checks(suite)
     if request.suite is not None:
-        cases = _choose(cases, request)
+        cases, checks = _choose(cases, checks, request)
     number, count = request.shard
-    return Plan(suite.name, tuple(cases[number - 1 :: count]))
+    mine = [*checks, *cases][number - 1 :: count]
+    return Plan(
+        suite.name,
+        tuple(item for item in mine if isinstance(item, Case)),
+        tuple(item for item in mine if isinstance(item, HardCheck)),
+    )
+
+
+def _checks(suite: SuiteFile) -> list[HardCheck]:
+    from aliasbench.bench.hard.catalog import HARD_CASES
+
+    return [
+        HardCheck(re.sub(r"[^A-Za-z0-9.]+", "-", f"hard {name} {subject}").strip("-."), HARD_CASES[name], subject)
+        for name in suite.hard_cases
+        for subject in HARD_CASES[name].subjects
+    ]
 
 
 def _ad_hoc(request: Request) -> SuiteFile:
@@ -195,10 +248,10 @@ def _case(scene: Scene, digest: str, technique: Technique, group: Group) -> Case
     )
 
 
-def _choose(cases: list[Case], request: Request) -> list[Case]:
-    """Return the cases of the scenes and techniques asked for; a scene's name without parameters means all of them."""
+def _choose(cases: list[Case], checks: list[HardCheck], request: Request) -> tuple[list[Case], list[HardCheck]]:
+    """Return what the request's scenes and techniques choose; a name without parameters means all of that name."""
     if request.scenes:
-        names = {case.scene.name for case in cases}
+        names = {case.scene.name for case in cases} | {check.case.name for check in checks}
         known = names | {name.partition(":")[0] for name in names}
         for text in request.scenes:
             if text not in known:
@@ -206,12 +259,16 @@ def _choose(cases: list[Case], request: Request) -> list[Case]:
         exact = names.intersection(request.scenes)
         short = set(request.scenes) - exact
         cases = [c for c in cases if c.scene.name in exact or c.scene.name.partition(":")[0] in short]
+        checks = [c for c in checks if c.case.name in exact]
     if request.techniques:
         known_techniques = {_meaning(case.technique) for case in cases}
-        wanted = [resolve_technique(text) for text in request.techniques]
-        for technique in wanted:
+        subjects = {check.subject for check in checks}
+        wanted = {text.strip(): resolve_technique(text) for text in request.techniques if text.strip() not in subjects}
+        for technique in wanted.values():
             if _meaning(technique) not in known_techniques:
-                raise unknown_name("technique of this suite:", technique.text, {c.technique.text for c in cases})
-        meanings = {_meaning(technique) for technique in wanted}
+                texts = {c.technique.text for c in cases} | subjects
+                raise unknown_name("technique of this suite:", technique.text, texts)
+        meanings = {_meaning(technique) for technique in wanted.values()}
         cases = [c for c in cases if _meaning(c.technique) in meanings]
-    return cases
+        checks = [c for c in checks if c.subject in {text.strip() for text in request.techniques}]
+    return cases, checks

@@ -15,6 +15,8 @@
     scenes = ["brick-floor"]
     frames = 4
 
+    hard_cases = ["all"]        # or names of them: they bring their own scenes, techniques and criteria
+
 Every scene of a group is rendered by every technique of it. Scene files are looked for beside the suite file first.
 Whether the scenes and techniques exist is checked by `suite.plan`, which builds them.
 """
@@ -49,6 +51,9 @@ SUITES: Mapping[str, SuiteEntry] = {
     "quick": SuiteEntry(
         "five scenes by the main techniques of both renderers, 256 x 256, under a minute", "quick.toml"
     ),
+    "hard-cases": SuiteEntry(
+        "where renderers break numerically, each with a criterion and a verdict", "hard-cases.toml"
+    ),
 }
 
 
@@ -68,12 +73,16 @@ class Group:
 
 @dataclass(frozen=True, slots=True)
 class SuiteFile:
-    """A suite as written. `where` names it in errors; `folder` is where its scene files are looked for first."""
+    """A suite as written. `where` names it in errors; `folder` is where its scene files are looked for first.
+
+    `hard_cases` are names of `bench.hard.catalog`, all of which are known.
+    """
 
     name: str
     where: str
     folder: Path | None
     groups: tuple[Group, ...]
+    hard_cases: tuple[str, ...] = ()
 
 
 def read_suite(text: str) -> SuiteFile:
@@ -121,7 +130,7 @@ def parse_suite(document: str, where: str, folder: Path | None, default_name: st
         raise InputError(f"{where}: schema = {shown(schema)}: must be {SCHEMA}")
     if schema > SCHEMA:
         raise InputError(f"{where}: schema = {shown(schema)} is newer than this version, which reads up to {SCHEMA}")
-    known = ("schema", "name", "summary", "case", *_READERS)
+    known = ("schema", "name", "summary", "case", "hard_cases", *_READERS)
     _refuse_unknown(table, known, where)
     for key in ("name", "summary"):
         if not isinstance(table.get(key, ""), str):
@@ -139,9 +148,25 @@ def parse_suite(document: str, where: str, folder: Path | None, default_name: st
         for key in ("scenes", "techniques"):
             if not getattr(group, key):
                 raise InputError(f"{where}: {key} is missing in group {number} (give it there or at the top)")
-    if not groups:
+    hard_cases = _hard_cases(table, where)
+    if not groups and not hard_cases:
         raise InputError(f"{where}: no scenes: give scenes = [...] at the top or in a [[case]]")
-    return SuiteFile(str(table.get("name", default_name)), where, folder, tuple(groups))
+    return SuiteFile(str(table.get("name", default_name)), where, folder, tuple(groups), hard_cases)
+
+
+def _hard_cases(table: Mapping[str, object], where: str) -> tuple[str, ...]:
+    if "hard_cases" not in table:
+        return ()
+    from aliasbench.bench.hard.catalog import HARD_CASES
+
+    try:
+        names = _texts(table["hard_cases"])
+        for name in names:
+            if name not in HARD_CASES and name != "all":
+                raise unknown_name("hard case", name, (*HARD_CASES, "all"))
+    except InputError as error:
+        raise InputError(f"{where}: hard_cases = {shown(table['hard_cases'])}: {error}") from None
+    return tuple(HARD_CASES) if "all" in names else names
 
 
 def _parse(document: str, where: str) -> dict[str, object]:

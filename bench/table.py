@@ -5,6 +5,7 @@ from itertools import groupby
 from typing import TYPE_CHECKING
 
 from aliasbench.bench.export import Record, Run
+from aliasbench.bench.hard.overview import TITLES, Cell, is_hard, overview
 from aliasbench.bench.timing import summarise
 from aliasbench.bench.wording import certainty, printable, sentence
 
@@ -31,10 +32,11 @@ def record_tables(run: Run, width: int) -> list["Table"]:
     from rich.table import Table
     from rich.text import Text
 
-    tables = []
+    measured = [record for record in run["records"] if not is_hard(record)]
+    tables = [hard_table(run)] if len(measured) < len(run["records"]) else []
     styles = {"failed": "red", "unsupported": "yellow"}
     wide = width >= WIDE
-    for (scene, size), group in groupby(run["records"], key=lambda r: (r["scene"], tuple(r["size"]))):
+    for (scene, size), group in groupby(measured, key=lambda r: (r["scene"], tuple(r["size"]))):
         records = list(group)
         shown = (*HEADLINES, *DIVISION) if width >= ROOMY else HEADLINES
         names = [n for n in shown if any(_number(r, n) != DASH for r in records)]
@@ -58,6 +60,24 @@ def record_tables(run: Run, width: int) -> list["Table"]:
             table.add_row(Text(printable(record["technique"]), styles.get(record["status"], "")), *map(Text, cells))
         tables.append(table)
     return tables
+
+
+def hard_table(run: Run) -> "Table":
+    """Return the verdicts of the hard cases: a row for each, a column for each subject."""
+    from rich import box
+    from rich.table import Table
+    from rich.text import Text
+
+    subjects, rows = overview([record for record in run["records"] if is_hard(record)])
+    table = Table(box=box.SIMPLE_HEAD, title=Text("hard cases", "bold"), title_justify="left", pad_edge=False)
+    table.add_column("case", overflow="fold")
+    for subject in subjects:
+        table.add_column(TITLES.get(subject, subject))
+    styles = {"failed": "red", "unsupported": "yellow", "limit": "cyan"}
+    for row in rows:
+        cells = (row.cells.get(subject, Cell("", "", "")) for subject in subjects)
+        table.add_row(Text(printable(row.name)), *(Text(cell.text, styles.get(cell.outcome, "")) for cell in cells))
+    return table
 
 
 def legend_lines(run: Run, width: int) -> list[str]:

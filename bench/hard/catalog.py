@@ -1,0 +1,8 @@
+"""Every hard case by name, group after group."""
+
+from collections.abc import Mapping
+
+from aliasbench.bench.hard import edges
+from aliasbench.bench.hard.case import HardCase
+
+HARD_CASES: Mapping[str, HardCase] = {case.name: case for group in (edges.CASES,) for case in group}
