@@ -18,6 +18,7 @@ from aliasbench.scenes.model import FloatArray
 PADDING = 8  # bins of the first search for each of the row's own
 STEPS = 50  # of Newton's method; it doubles the digits, and takes 4 to 6
 LEAST_SAMPLES = 8
+NO_CHANGE = 1e-10  # of the rows' size times their length
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -125,4 +126,6 @@ def _newton_step(s: FloatArray, nu: float) -> float:
     """Return the step of Gauss and Newton in the frequency, means and amplitudes following (variable projection)."""
     _, residual, change = _fit(s, nu)
     steepness = float(np.sum(change**2))
-    return float(np.sum(change * residual)) / steepness if steepness > 0.0 else 0.0
+    # At exactly 1/2 nothing changes but by rounding, which would step anywhere.
+    least = NO_CHANGE**2 * float(np.sum(s**2)) * s.shape[1] ** 2
+    return float(np.sum(change * residual)) / steepness if steepness > least else 0.0

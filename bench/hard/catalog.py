@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from aliasbench.bench.hard import edges
+from aliasbench.bench.hard import edges, motion
 from aliasbench.bench.hard.case import HardCase
 
-HARD_CASES: Mapping[str, HardCase] = {case.name: case for group in (edges.CASES,) for case in group}
+HARD_CASES: Mapping[str, HardCase] = {case.name: case for group in (edges.CASES, motion.CASES) for case in group}

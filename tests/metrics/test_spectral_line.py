@@ -59,6 +59,15 @@ def test_whole_frequencies_are_constants_without_a_wave(nu: float) -> None:
     assert line.residual_rms < 1e-12
 
 
+@pytest.mark.parametrize("count", [8, 24, 63, 256])
+def test_half_a_cycle_per_sample_is_found_exactly_at_any_phases(count: int) -> None:
+    phases = (0.0, 0.03, 0.1, 0.2, 0.37, 0.5, 0.51, 0.8)
+    rows = np.concatenate([np.atleast_2d(wave(0.5, phase, count)) for phase in phases])
+    line = recover_frequency(rows, least_amplitude=1e-9)
+    assert line.cycles_per_px == 0.5
+    assert recover_frequency(rows[3]).cycles_per_px == 0.5
+
+
 def test_a_wave_below_the_least_amplitude_is_none() -> None:
     rows = wave(0.2, 0.1, amplitude=1e-4)
     assert recover_frequency(rows).cycles_per_px == pytest.approx(0.2, abs=1e-9)
