@@ -101,7 +101,9 @@ def _encode(path: Path, pixels: NDArray[np.floating]) -> None:
         spec.attribute("compression", "zip")
         # Otherwise the time of writing: the same pixels shall be the same bytes.
         spec.attribute("DateTime", "1970:01:01 00:00:00")
-        data = np.ascontiguousarray(pixels, dtype=np.float32)
+        # what float32 cannot hold is infinite in the file
+        with np.errstate(over="ignore"):
+            data = np.ascontiguousarray(pixels, dtype=np.float32)
     else:
         spec = oiio.ImageSpec(width, height, 3, oiio.UINT8)
         spec.attribute("oiio:ColorSpace", "sRGB")

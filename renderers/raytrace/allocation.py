@@ -56,8 +56,11 @@ def wanted_number(variance: float, tolerance: float, exponent: float, least: int
     """Return how many samples of a variance bring the standard error to the tolerance, from `least` to `most`."""
     if variance <= 0.0:
         return least
-    wanted = math.ceil((variance / (tolerance * tolerance)) ** (1.0 / exponent) - 1e-9)
-    return least if wanted < least else (most if wanted > most else int(wanted))
+    # compared as floats: no integer holds what a tolerance out of reach asks for
+    wanted = (variance / (tolerance * tolerance)) ** (1.0 / exponent) - 1e-9
+    if not wanted < most:
+        return most
+    return max(least, math.ceil(wanted))
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

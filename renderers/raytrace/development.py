@@ -189,7 +189,9 @@ class Development:
                 self._splat(first, passes, numbers, window, top)
                 done = min(after - margin, height) - top if after < height + margin else height - top
                 if done > 0:
-                    out[top : top + done] = self._resolve(window[:done])
+                    # what float32 cannot hold comes out infinite, as it does without a filter
+                    with np.errstate(over="ignore", invalid="ignore"):
+                        out[top : top + done] = self._resolve(window[:done])
                     window, top = window[done:].copy(), top + done
             else:
                 if film is None:

@@ -196,6 +196,18 @@ def test_a_looser_tolerance_takes_fewer_samples(star: Scene) -> None:
         assert loose >= 4 * SIDE**2
 
 
+@pytest.mark.parametrize("adaptive", ["pooled", "unbiased"])
+@pytest.mark.parametrize("tolerance", ["1e-9", "1e-12", "1e-30", "1e-200"])
+def test_a_tolerance_out_of_reach_takes_all_samples(comb: Any, adaptive: str, tolerance: str) -> None:
+    # 1e-12 asks for more samples than an int64 holds, 1e-200 for more than a float64 does. Every pilot sees the edge:
+    # it is between the two columns of cells.
+    technique = f"raytrace:adaptive={adaptive},sampler=jittered,min_spp=4,max_spp=100,tolerance={tolerance}"
+    frame = render(comb(0.5, 8), technique, size=(8, 8))
+    np.testing.assert_array_equal(frame.sample_counts, np.full((8, 8), 100))
+    flat = render(comb(0.0001, 8, 1.0, 1.0), technique, size=(8, 8))
+    np.testing.assert_array_equal(flat.sample_counts, np.full((8, 8), 4))
+
+
 @pytest.mark.parametrize("adaptive", ["pooled", "unbiased", "unbiased,pattern=shared"])
 @pytest.mark.parametrize("filtering", ["filter=box", "filter=tent", "filter=gaussian,weighting=distribution"])
 def test_equal_bounds_are_uniform_sampling(star: Scene, adaptive: str, filtering: str) -> None:
