@@ -2,7 +2,9 @@
 
 from collections.abc import Mapping
 
-from aliasbench.bench.hard import edges, motion
+from aliasbench.bench.hard import edges, motion, values
 from aliasbench.bench.hard.case import HardCase
 
-HARD_CASES: Mapping[str, HardCase] = {case.name: case for group in (edges.CASES, motion.CASES) for case in group}
+_GROUPS = (edges.CASES, motion.CASES, values.CASES)
+
+HARD_CASES: Mapping[str, HardCase] = {case.name: case for group in _GROUPS for case in group}
