@@ -16,6 +16,7 @@ from aliasbench.scenes.model import FloatArray, Scene
 _SNAP = 1.0 / 512.0  # vertices on 1/256 px move an upright edge by so much
 # An estimate's mean over 8 seeds is farther from the truth once in 2000 (Student's t, 7 degrees).
 _SEEDS, _DEVIATIONS = 8, 6.0
+_SAMPLES = 64
 _FILTERINGS = (
     "filter=box,radius=0.1",
     "filter=box,radius=8",
@@ -104,7 +105,7 @@ def _mean_error(
     subject: str, scene: Scene, size: tuple[int, int], keys: tuple[str, str], truth: FloatArray
 ) -> tuple[float, float]:
     """Return the mean error of pictures whose rows are all `truth`, over seeds, and its standard error."""
-    with prepare(scene, sampled(subject, 64, *keys), size=size) as prepared:
+    with prepare(scene, sampled(subject, _SAMPLES, *keys), size=size) as prepared:
         if subject.startswith("reference"):
             return float(np.abs(prepared.render().pixels[..., 0] - truth).max()), 0.0
         errors = [
@@ -178,8 +179,8 @@ def _wide(subject: str) -> Verdict:
         lambda filtering: _SNAP * spec_of(filtering).peak + device_rounding(spec_of(filtering)),
         "closed form: the filter's integral up to the edge; "
         f"{_DEVIATIONS:g} standard errors, on the device its products and sums, and 1/512 px times the filter's peak",
-        # one of 64 strata a pixel is cut by the edge, of variance 1/4 at most; too few seeds may all fall on one side
-        floor=lambda filtering: spec_of(filtering).peak * 0.5 / 64.0 / math.sqrt(_SEEDS),
+        # the edge cuts one of a pixel's strata, of variance 1/4 at most; few seeds may all fall on one side of it
+        floor=lambda filtering: spec_of(filtering).peak * 0.5 / _SAMPLES / math.sqrt(_SEEDS),
     )
 
 

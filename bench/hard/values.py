@@ -18,6 +18,7 @@ from aliasbench.scenes.errors import InputError
 from aliasbench.scenes.model import FloatArray, Motion, Scene
 
 _BRIGHT, _DARK = 1e6, 1e-6
+_SAMPLES = 1024
 _LARGEST_RASTER, _LARGEST = 2.0**100, 3e38
 
 
@@ -28,7 +29,7 @@ def _red(scene: Scene, technique: str, size: tuple[int, int]) -> FloatArray:
 def _both_in_a_pixel(subject: str) -> Verdict:
     """Relative errors of pixels half of 1e6 and half of 1e-6."""
     size = (2, 2)
-    ways = [sampled(subject, 1024, more="sampler=grid")]
+    ways = [sampled(subject, _SAMPLES, more="sampler=grid")]
     if is_raster(subject):
         ways += [with_keys(subject, keys) for keys in ("msaa=4", "ssaa=32", "msaa=4,filter=box,passes=4,sampler=grid")]
     truth = 0.5 * (_BRIGHT + _DARK)
@@ -60,13 +61,14 @@ def _both_signs(subject: str) -> Verdict:
         for left, value in ((0.0, _BRIGHT), (0.25, -_BRIGHT))
     ]
     scene = picture(strips, size, background=_DARK)
-    got = _red(scene, sampled(subject, 1024, more="sampler=grid"), size)
+    got = _red(scene, sampled(subject, _SAMPLES, more="sampler=grid"), size)
     return Verdict(
         float(np.abs(got - 0.5 * _DARK).max()),
         "radiance",
         0.5 * _DARK * HALF_ULP,
-        256 * _BRIGHT * 2.0**-53,
-        "partial sums of 1024 samples reach 256e6, of which float64 keeps 2^-53; a float32 sum would lose all of 1e-6",
+        _SAMPLES / 4 * _BRIGHT * 2.0**-53,
+        f"partial sums of {_SAMPLES} samples reach {_SAMPLES / 4:g}e6, of which float64 keeps 2^-53: what is left of it "
+        "depends on their order; a float32 sum would lose all of 1e-6",
     )
 
 
@@ -130,7 +132,7 @@ def _largest(subject: str) -> Verdict:
     def flat(radiance: float) -> Scene:
         return picture([panel(-9.0, -9.0, 11.0, 11.0, size, gray(radiance))], size)
 
-    error = float(np.abs(_red(flat(value), sampled(subject, 1024), size) / value - 1.0).max())
+    error = float(np.abs(_red(flat(value), sampled(subject, _SAMPLES), size) / value - 1.0).max())
     note = ""
     if is_raster(subject):
         try:
