@@ -67,7 +67,7 @@ def _both_signs(subject: str) -> Verdict:
         "radiance",
         0.5 * _DARK * HALF_ULP,
         _SAMPLES / 4 * _BRIGHT * 2.0**-53,
-        f"partial sums of {_SAMPLES} samples reach {_SAMPLES / 4:g}e6, of which float64 keeps 2^-53: what is left of it "
+        f"partial sums of {_SAMPLES} samples reach {_SAMPLES / 4:g}e6, of which float64 keeps 2^-53: what is left "
         "depends on their order; a float32 sum would lose all of 1e-6",
     )
 
