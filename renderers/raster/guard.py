@@ -22,8 +22,8 @@ from aliasbench.scenes.model import FloatArray, Scene
 
 # in half pictures: how much wider than the picture the frustum is that far triangles are cut to
 _WIDTH = 2.0
-# half pixels: float32 rounds there by 2^-6 of a pixel, less than the quarter of a device's own sub-pixel steps
-_REACH = 2.0**19
+# half pixels: float32 rounds there by 2^-8 of a pixel, one of a device's own sub-pixel steps
+_REACH = 2.0**18
 # relative roundings: what is beyond doubt in float32; float64's in the sums at hand; beyond anything float32 can hold
 _SURE, _ROUNDING, _HUGE = 2.0**-20, 2.0**-48, 2.0**60
 # half pictures: float64 rounds there by 2^-8 of one

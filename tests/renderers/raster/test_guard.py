@@ -64,6 +64,26 @@ def test_a_vast_triangle_fills_an_orthographic_picture(make, e):
     np.testing.assert_array_equal(render(scene, "raster:passes=4", size=SIZE).pixels, 1.0)
 
 
+@pytest.mark.parametrize("length", [5e4, 1.2e5, 2.5e5, 1e6])
+def test_the_texture_of_a_long_surface_keeps_its_place(make, length):
+    # a pixel is a unit; rows of squares of 4 pixels start at a pixel's centre and lean by 1e-3 of a pixel each row
+    corners = np.array([(-24.015, -24.015, 0.0), (length, -24.015, 0.0), (length, 24.015, 0.0), (-24.015, 24.015, 0.0)])
+    uv = [((x - 0.5 + 1e-3 * y) / 4.0, 0.5) for x, y, _ in corners]
+    scene = make.scene(
+        make.polygon(corners, uv=uv, texture="c"),
+        camera=Camera("orthographic", height=float(SIZE[1])),
+        textures={"c": Checker((1.0, 1.0))},
+    )
+    pixels = render(scene, "raster", size=SIZE).pixels[..., 0]
+    x, y = np.meshgrid(np.arange(SIZE[0]) + 0.5 - SIZE[0] / 2, SIZE[1] / 2 - 0.5 - np.arange(SIZE[1]))
+    place = x - 0.5 + 1e-3 * y
+    apart = np.abs(place - 4.0 * np.round(place / 4.0))
+    wrong = pixels != np.floor(place / 4.0) % 2.0
+    # corners that snap to 1/256 pixel move what lies between them by half of that, right and up
+    assert (apart < 1e-3).any()
+    assert apart[wrong].max(initial=0.0) <= np.sqrt(2.0) / 512.0
+
+
 def test_the_edge_of_a_vast_triangle_is_where_it_is(make):
     # x + 2 y = 0.1 for every e; the picture is 2 high
     for e in FAR[:3]:
