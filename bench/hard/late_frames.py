@@ -90,7 +90,7 @@ CASES = (
         _late_turns,
     ),
     HardCase(
-        "late-flight",
+        "latest-flight",
         "sizes",
         "Camera and object fly side by side for a billion frames, 3e9 pixels far.",
         "The picture is that of frame 0.",

@@ -78,7 +78,7 @@ BENDS: dict[str, tuple[Bend, ...]] = {
     "filtered-texels": (shifted, one_off, lost),
     "texture-too-wide": (shifted, one_off, dimmed),
     "late-turns": (shifted, one_off),
-    "late-flight": (shifted, one_off),
+    "latest-flight": (shifted, one_off),
 }
 
 
