@@ -2,10 +2,11 @@
 
 from collections.abc import Mapping, Sequence
 from itertools import groupby
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from aliasbench.bench.export import Record, Run
-from aliasbench.bench.hard.overview import TITLES, Cell, is_hard, overview
+from aliasbench.bench.hard.case import HARD_CASE
+from aliasbench.bench.hard.overview import TITLES, Cell, Found, is_hard, overview
 from aliasbench.bench.timing import summarise
 from aliasbench.bench.wording import certainty, printable, sentence
 
@@ -32,7 +33,7 @@ def record_tables(run: Run, width: int) -> list["Table"]:
     from rich.table import Table
     from rich.text import Text
 
-    measured = [record for record in run["records"] if not is_hard(record)]
+    measured = [record for record in run["records"] if not is_hard(record["size"])]
     tables = [hard_table(run)] if len(measured) < len(run["records"]) else []
     styles = {"failed": "red", "unsupported": "yellow"}
     wide = width >= WIDE
@@ -68,7 +69,7 @@ def hard_table(run: Run) -> "Table":
     from rich.table import Table
     from rich.text import Text
 
-    subjects, rows = overview([record for record in run["records"] if is_hard(record)])
+    subjects, rows = overview(_found(record) for record in run["records"] if is_hard(record["size"]))
     table = Table(box=box.SIMPLE_HEAD, title=Text("hard cases", "bold"), title_justify="left", pad_edge=False)
     table.add_column("case", overflow="fold")
     for subject in subjects:
@@ -78,6 +79,12 @@ def hard_table(run: Run) -> "Table":
         cells = (row.cells.get(subject, Cell("", "", "")) for subject in subjects)
         table.add_row(Text(printable(row.name)), *(Text(cell.text, styles.get(cell.outcome, "")) for cell in cells))
     return table
+
+
+def _found(record: Record) -> Found:
+    score: Any = record["metrics"].get(HARD_CASE)
+    verdict = () if score is None else (score["value"], score["status"], score["extras"])
+    return Found(record["scene"], record["technique"], record["status"], record["error"], *verdict)
 
 
 def legend_lines(run: Run, width: int) -> list[str]:

@@ -19,6 +19,7 @@ from aliasbench.reports import charts, tables
 from aliasbench.reports.convergence import convergence_sections
 from aliasbench.reports.figures import HEAT_HIGH, HEAT_LOW, heat_palette
 from aliasbench.reports.gallery import Gallery, make_galleries
+from aliasbench.reports.hard_cases import hard_sections, split_records
 from aliasbench.reports.markup import make_environment
 from aliasbench.reports.records import Record, Run, load_runs
 from aliasbench.reports.signal_figures import SignalFigure, draw_records
@@ -82,7 +83,8 @@ def write_report(run_dirs: Sequence[Path], out: Path) -> Path:
 
 def render_page(runs: Sequence[Run]) -> str:
     """Return the whole page as text."""
-    records = [record for run in runs for record in run.records]
+    every = [record for run in runs for record in run.records]
+    records, hard = split_records(every)
     labels = [run.label for run in runs]
     groups = _by_scene(records)
     scenes = _scene_sections(groups, labels)
@@ -95,11 +97,12 @@ def render_page(runs: Sequence[Run]) -> str:
             machines=[_machine_facts(run) for run in runs if run.machine],
             suites=", ".join(dict.fromkeys(run.suite for run in runs if run.suite)),
             dates=_dates(runs),
-            counts=tables.status_counts(records),
+            counts=tables.status_counts(every),
             scenes=scenes,
-            troubles=_troubles(records),
+            troubles=_troubles(every),
             overview=tables.overview_table(records) if records else None,
             convergence=convergence_sections(groups),
+            hard=hard_sections(hard),
             records=tables.record_table(records, labels),
             meanings=tables.column_meanings(records),
             figures=[{"id": s.anchor, **s.figure} for s in scenes if s.figure],

@@ -3,16 +3,13 @@
 For the terminal and the report alike: text and facts, no layout.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from aliasbench.bench.hard.case import ALL, HARD_CASE, METRICS
+from aliasbench.bench.hard.case import ALL, METRICS
 
-if TYPE_CHECKING:
-    from aliasbench.bench.export import Record
-
-NO_PICTURE = [0, 0]  # the size that records of hard cases have
+NO_PICTURE = (0, 0)  # the size that records of hard cases have
 TITLES = {
     "raytrace:": "tracer",
     "raytrace:robust=off": "robust off",
@@ -25,12 +22,29 @@ TITLES = {
 
 
 @dataclass(frozen=True, slots=True)
+class Found:
+    """A record of a hard case: `outcome` and `extras` are its verdict's, None where there is none but a reason."""
+
+    name: str
+    subject: str
+    status: str
+    error: str | None
+    value: float | None = None
+    outcome: str | None = None
+    extras: Mapping[str, Any] | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Cell:
-    """One verdict: `outcome` is "ok", "limit", "failed" or "unsupported"; `text` is short, `detail` says it all."""
+    """One verdict: `outcome` is "ok", "limit", "failed" or "unsupported"; `text` is short, `detail` says it all.
+
+    `why` is where its bounds come from, empty where a reason stands in place of a verdict.
+    """
 
     outcome: str
     text: str
     detail: str
+    why: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,44 +58,41 @@ class Row:
     cells: dict[str, Cell]
 
 
-def is_hard(record: "Record") -> bool:
-    """Return whether a record is a hard case's."""
-    return record["size"] == NO_PICTURE
+def is_hard(size: Sequence[int]) -> bool:
+    """Return whether a record with pictures of such a size is a hard case's."""
+    return tuple(size) == NO_PICTURE
 
 
-def overview(records: Sequence["Record"]) -> tuple[list[str], list[Row]]:
-    """Return the subjects that occur, in their usual order, and a row for each hard case in the records' order."""
+def overview(found: Iterable[Found]) -> tuple[list[str], list[Row]]:
+    """Return the subjects that occur, in their usual order, and a row for each hard case in the order found."""
     from aliasbench.bench.hard.catalog import HARD_CASES
 
     rows: dict[str, Row] = {}
-    for record in records:
-        name = record["scene"]
-        case = HARD_CASES.get(name)
-        extras: Any = record["metrics"].get(HARD_CASE, {}).get("extras", {})
+    for each in found:
+        case, extras = HARD_CASES.get(each.name), each.extras or {}
         group, question, criterion = (
             str(extras.get(key) or getattr(case, key, "")) for key in ("group", "question", "criterion")
         )
-        row = rows.setdefault(name, Row(name, group, question, criterion, {}))
-        row.cells[record["technique"]] = make_cell(record)
+        row = rows.setdefault(each.name, Row(each.name, group, question, criterion, {}))
+        row.cells[each.subject] = make_cell(each)
     present = {subject for row in rows.values() for subject in row.cells}
     usual = [subject for subject in (*ALL, METRICS) if subject in present]
     return [*usual, *sorted(present.difference(usual))], list(rows.values())
 
 
-def make_cell(record: "Record") -> Cell:
-    """Return a record's verdict in few characters and in full."""
-    score: Any = record["metrics"].get(HARD_CASE)
-    if score is None:
-        return Cell(record["status"], record["status"], record["error"] or "no reason was recorded")
-    extras = score["extras"]
-    unit, error = extras["unit"], extras["standard_error"]
-    detail = f"{figure(score['value'])} {unit}, {figure(extras['bound'])} allowed: {extras['why']}"
-    if error is not None:
-        detail += f"; standard error {figure(error)}"
+def make_cell(found: Found) -> Cell:
+    """Return a verdict in few characters and in full."""
+    extras = found.extras
+    if extras is None or found.outcome is None:
+        return Cell(found.status, found.status, found.error or "no reason was recorded")
+    measured = f"{figure(found.value)} {extras['unit']}"
+    detail = f"{measured}, {figure(extras['bound'])} allowed"
+    if extras["standard_error"] is not None:
+        detail += f", standard error {figure(extras['standard_error'])}"
     if extras["note"]:
         detail += f"; {extras['note']}"
-    text = "ok" if score["status"] == "ok" else f"{score['status']} {figure(score['value'])}"
-    return Cell(score["status"], text, detail)
+    text = "ok" if found.outcome == "ok" else f"{found.outcome} {figure(found.value)}"
+    return Cell(found.outcome, text, detail, str(extras["why"]))
 
 
 def figure(value: float | None) -> str:
