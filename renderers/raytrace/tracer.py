@@ -19,6 +19,7 @@ from aliasbench.renderers.lights import light_values, with_lights
 from aliasbench.renderers.raytrace.allocation import error_exponent
 from aliasbench.renderers.raytrace.bodies import BODY_SIZE, body_values
 from aliasbench.renderers.raytrace.development import Development, Room, is_plain, make_optics
+from aliasbench.renderers.raytrace.edge_on import keeps_planes, without_edge_on
 from aliasbench.renderers.raytrace.exposure import Exposure, plan_exposure
 from aliasbench.renderers.raytrace.film import Film
 from aliasbench.renderers.raytrace.lighting import is_scattered, put_materials
@@ -206,7 +207,9 @@ class PreparedRaytrace:
         if exposure.mesh_key == self._mesh_key:
             return
         mesh = merge_bodies(self._scene, self._looks, exposure.still, exposure.shutter, exposure.anchor)
-        self._engine.set_still(mesh)
+        # light comes from all sides; a camera sees only what faces it
+        only_seen = not self._is_scattered and keeps_planes(self._scene.camera)
+        self._engine.set_still(without_edge_on(mesh, exposure.shutter.first, exposure.anchor) if only_seen else mesh)
         self._still = build_ownership((mesh,), placed=self._placed)
         self._mesh_key = exposure.mesh_key
 
