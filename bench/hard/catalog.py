@@ -2,11 +2,14 @@
 
 from collections.abc import Mapping
 
-from aliasbench.bench.hard import depth, edges, footprints, horizon, motion, scale, sizes, values
+from aliasbench.bench.hard import depth, edges, footprints, horizon, motion, moving_edges, scale, shared_edges, sizes, texel_lines, values
 from aliasbench.bench.hard.case import HardCase
 
 _GROUPS = (
     edges.CASES,
+    moving_edges.CASES,
+    shared_edges.CASES,
+    texel_lines.CASES,
     scale.CASES,
     depth.CASES,
     footprints.CASES,
