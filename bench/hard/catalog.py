@@ -2,7 +2,19 @@
 
 from collections.abc import Mapping
 
-from aliasbench.bench.hard import depth, edges, footprints, horizon, motion, moving_edges, scale, shared_edges, sizes, texel_lines, values
+from aliasbench.bench.hard import (
+    depth,
+    edges,
+    footprints,
+    horizon,
+    motion,
+    moving_edges,
+    scale,
+    shared_edges,
+    sizes,
+    texel_lines,
+    values,
+)
 from aliasbench.bench.hard.case import HardCase
 
 _GROUPS = (
