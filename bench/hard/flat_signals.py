@@ -19,6 +19,7 @@ FRAMES, SIDE = 4, 64
 Expected = Mapping[str, float | str]
 # What stands for a number that needs no more than to be one.
 ANY = math.nan
+FACTS = {"edges", "rotors", "pans", "gratings", "patterns", "centers"}  # needs that a bare scene does not meet
 _NO_MODULATION = "undefined_no_modulation"
 # A perfect picture's score, of one seed, whatever its grey above 0.
 PERFECT: Expected = {
@@ -28,6 +29,8 @@ PERFECT: Expected = {
     "psnr": "identical",
     "buzz": "undefined_no_shimmer",
     "apparent_rate": _NO_MODULATION,
+    **dict.fromkeys(("mtf50", "edge_width"), "undefined_no_edge"),
+    **dict.fromkeys(("apparent_velocity", "spatial", "temporal", "shutter"), "not_applicable"),
 }
 # An error that is the same everywhere and at all times: it is no shimmer, no moire, no jaggedness.
 SHIFTED: Expected = {
@@ -175,7 +178,7 @@ def _small(subject: str) -> Verdict:  # noqa: ARG001 - no renderer is involved
                 found[what] = mistakes(scores, dict.fromkeys(catalog.METRICS, "undefined_too_small"))
                 continue
             expected: dict[str, float | str] = {
-                name: "not_applicable" if {"edges", "rotors", "pans"} & set(metric.needs) else ANY
+                name: "not_applicable" if FACTS & set(metric.needs) else ANY
                 for name, metric in catalog.METRICS.items()
             }
             expected["bias"] = scores["bias"].status if scores["bias"].value is None else ANY
