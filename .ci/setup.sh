@@ -1,6 +1,6 @@
 #!/bin/sh
-# Sets up .venv and the system packages it needs; does nothing where all is there. `setup.sh browser` adds Chromium,
-# which only the report's browser tests use.
+# Sets up .venv and the system packages it needs; does nothing where all is there. `setup.sh browser` adds Chromium
+# and OSMesa, which only tests use.
 set -eu
 cd "$(dirname "$0")/.."
 python=${PYTHON:-python3}
@@ -62,4 +62,6 @@ if [ "${1:-}" = browser ]; then
         # shellcheck disable=SC2086
         install $missing || say "the browser tests will fail; run as root: apt-get install$missing"
     fi
+    # The other GL backend; newer systems no longer have it, and its tests then say so.
+    has_library libOSMesa || install libosmesa6 || say "no OSMesa here: its tests check what is said of that"
 fi

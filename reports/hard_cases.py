@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 from aliasbench.bench.hard.case import HARD_CASE
 from aliasbench.bench.hard.overview import TITLES, Found, Row, is_hard, overview
+from aliasbench.bench.hard.overview import Cell as Answer
 from aliasbench.reports.records import Record
 from aliasbench.reports.tables import Cell, Heading, Table
 
@@ -72,13 +73,15 @@ def _table(rows: Sequence[Row], subjects: Sequence[str]) -> Table:
         line = [Cell(row.name, note=f"{row.question} {row.criterion}")]
         for subject in asked:
             cell = row.cells.get(subject)
-            line.append(
-                Cell("")
-                if cell is None
-                else Cell(cell.text, title=f"{cell.detail}: {cell.why}", style=STYLES.get(cell.outcome, "badge"))
-            )
+            line.append(Cell("") if cell is None else _verdict(cell))
         cells.append(line)
     return Table(headings, cells, ["" for _ in rows])
+
+
+def _verdict(cell: Answer) -> Cell:
+    unit = "" if cell.outcome == "ok" else cell.unit
+    title = f"{cell.detail}: {cell.why}" if cell.why else cell.detail
+    return Cell(cell.text, title=title, style=STYLES.get(cell.outcome, "badge"), note=unit)
 
 
 def _limits(row: Row, subjects: Sequence[str]) -> list[Limit]:

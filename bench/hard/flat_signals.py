@@ -178,8 +178,7 @@ def _small(subject: str) -> Verdict:  # noqa: ARG001 - no renderer is involved
                 found[what] = mistakes(scores, dict.fromkeys(catalog.METRICS, "undefined_too_small"))
                 continue
             expected: dict[str, float | str] = {
-                name: "not_applicable" if FACTS & set(metric.needs) else ANY
-                for name, metric in catalog.METRICS.items()
+                name: "not_applicable" if FACTS & set(metric.needs) else ANY for name, metric in catalog.METRICS.items()
             }
             expected["bias"] = scores["bias"].status if scores["bias"].value is None else ANY
             if left < 7:

@@ -38,12 +38,14 @@ class Found:
 class Cell:
     """One verdict: `outcome` is "ok", "limit", "failed" or "unsupported"; `text` is short, `detail` says it all.
 
-    `why` is where its bounds come from, empty where a reason stands in place of a verdict.
+    `unit` is the measured figure's, `why` is where its bounds come from; both are empty where a reason stands in place
+    of a verdict.
     """
 
     outcome: str
     text: str
     detail: str
+    unit: str = ""
     why: str = ""
 
 
@@ -92,7 +94,7 @@ def make_cell(found: Found) -> Cell:
     if extras["note"]:
         detail += f"; {extras['note']}"
     text = "ok" if found.outcome == "ok" else f"{found.outcome} {figure(found.value)}"
-    return Cell(found.outcome, text, detail, str(extras["why"]))
+    return Cell(found.outcome, text, detail, str(extras["unit"]), str(extras["why"]))
 
 
 def figure(value: float | None) -> str:
