@@ -16,6 +16,7 @@ PLANES = 5
 # The near plane's depth over the largest camera coordinate. Nothing divides by the depth of parallel rays, and what
 # lies in the camera's own plane is seen: rounding must not take it for behind.
 NEAR_PERSPECTIVE, NEAR_PARALLEL = 1e-15, -1e-14
+EDGE_ON = 16 * 2.0**-52  # distance from the eye of a plane, over that of a corner, that is none
 ONE_CORNER = 4 * 2.0**-52  # corners this near, over the width of the picture, are one up to rounding
 
 
@@ -128,7 +129,9 @@ def nearness_plane(o: FloatArray, n: Triple, perspective: bool) -> tuple[bool, f
     """
     d = dot(n, o)
     lead = d if perspective else n[2]
-    if dot(n, n) == 0.0 or lead == 0.0:
+    # a plane that holds the eye but for rounding is seen edge-on, and not as half of the picture
+    through_eye = EDGE_ON * np.sqrt(dot(n, n) * dot(o, o)) if perspective else 0.0
+    if dot(n, n) == 0.0 or abs(lead) <= through_eye:
         return False, 0.0, 0.0, 0.0
     if perspective:
         return True, n[0] / d, n[1] / d, n[2] / d

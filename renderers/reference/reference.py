@@ -13,7 +13,7 @@ Nothing made of unlit and diffuse surfaces is refused. What is drawn how, and wh
 """
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import TracebackType
 from typing import Self
 
@@ -26,6 +26,7 @@ from aliasbench.renderers.reference.constant_uv import paint_constant
 from aliasbench.renderers.reference.cutouts import expand
 from aliasbench.renderers.reference.defocus import draw_layers, is_in_focus
 from aliasbench.renderers.reference.faces import Faces, build_faces
+from aliasbench.renderers.reference.far_edges import far_rounding
 from aliasbench.renderers.reference.filtered import draw_filtered, wide_view
 from aliasbench.renderers.reference.flat import Integral
 from aliasbench.renderers.reference.paths import Paths, scene_paths
@@ -36,7 +37,7 @@ from aliasbench.scenes.errors import UnsupportedScene
 from aliasbench.scenes.model import Checker, ImageTexture, Scene, ZonePlate, content_digest
 from aliasbench.scenes.projection import view_at
 
-ALGORITHM = 7  # changes with anything that changes a reference's pixels: stored ones are not used then
+ALGORITHM = 8  # changes with anything that changes a reference's pixels: stored ones are not used then
 _WIDE = 1e-3  # a bound beyond which sampling may do better
 
 
@@ -71,6 +72,10 @@ class PreparedReference:
             stored = self._at_once(shown)
         else:
             stored = fetch(self.key(shown), lambda: self._make(shown))
+        far = far_rounding(self.scene, self.size, shown, self._fractions, self.spec)
+        if far > 0.0:
+            largest = 1.0 if self.scene.lights else _brightest(self.scene)
+            stored = replace(stored, uncertainty=stored.uncertainty + far * max(1.0, largest))
         self._check(stored)
         if progress is not None:
             progress(1.0)
