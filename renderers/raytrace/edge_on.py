@@ -17,6 +17,7 @@ from aliasbench.scenes.projection import View
 
 # Sine of the angle between ray and plane. Float32 keeps the sign of any volume above some 2^-20 of its factors.
 _STEEPEST = 2.0**-12
+_DEEPEST = 8.0  # farthest over least depth of a triangle of which all parts are seen alike
 # Of 2^-24: what the roundings of Embree's robust test add up to at most, see `bench.hard.edge_pictures`.
 _ROUNDINGS = 16.0
 
@@ -70,6 +71,8 @@ def _are_thin(corners: FloatArray, view: View) -> NDArray[np.bool_]:
     depth = view.to_camera(corners)[..., 2].min(axis=1)
     if view.perspective:
         before = depth > 0.0
+        # of one that reaches far beyond its nearest corner the nearer part may be seen well
+        before &= reach <= _DEEPEST * depth
         depth = np.where(before, depth, 1.0)
         image = view.project(np.where(before[:, None, None], corners, view.origin + view.forward))[..., :2]
         exact = view.scale * (reach / depth) ** 2

@@ -19,6 +19,7 @@ from aliasbench.scenes.projection import View, view_at
 
 # Above this many triangles an instant of a moving mesh is traced in the mesh's own frame instead of rebuilt.
 MERGE_LIMIT = 4096
+_WIDEST = 4.0  # pictures: larger surfaces are cut to parts of this size (`cutting`)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,6 +30,9 @@ class Exposure:
     ----------
     shutter : Shutter
     anchor : (3,) float64
+    anchor_view : View
+        From there; the camera comes no farther away than `travel` (world units).
+    travel : float
     still, moving : tuple of Body
         Bodies of the merged mesh, and those that are traced in their own frame.
     has_times : bool
@@ -39,6 +43,8 @@ class Exposure:
 
     shutter: Shutter
     anchor: FloatArray
+    anchor_view: View
+    travel: float
     still: tuple[Body, ...]
     moving: tuple[Body, ...]
     has_times: bool
@@ -53,8 +59,9 @@ def plan_exposure(
     first = view_at(scene.camera, scene.animation, frame, opening, size)
     last = view_at(scene.camera, scene.animation, frame, closing, size) if closing > opening else first
     anchor_frame = _anchor_frame(scene, frame)
-    anchor = view_at(scene.camera, scene.animation, anchor_frame, 0.0, size).origin
-    depth = _layer_depth(bodies, first)
+    anchor_view = view_at(scene.camera, scene.animation, anchor_frame, 0.0, size)
+    anchor, travel = anchor_view.origin, 0.0 if not any(scene.camera.velocity) else _reach(scene)
+    depth = _layer_depth(bodies, first, travel)
     is_matrix = technique.motion == "matrix"
     shutter = Shutter(frame, opening, closing, first, last, depth, scene.camera.lens_radius, is_matrix)
     # A layer above others is brought towards the eye, and so moves with it.
@@ -62,10 +69,11 @@ def plan_exposure(
     restless = [b for b, is_apart in zip(bodies, apart, strict=True) if is_apart]
     if opening == closing and sum(len(b.triangles) for b in restless) <= MERGE_LIMIT:
         key = (anchor_frame, frame) if restless else (anchor_frame,)
-        return Exposure(shutter, anchor, tuple(bodies), (), False, key)
+        return Exposure(shutter, anchor, anchor_view, travel, tuple(bodies), (), has_times=False, mesh_key=key)
     still = tuple(b for b, is_apart in zip(bodies, apart, strict=True) if not is_apart)
     camera_moves = closing > opening and not scene.camera.is_static
-    return Exposure(shutter, anchor, still, tuple(restless), bool(restless) or camera_moves, (anchor_frame,))
+    has_times = bool(restless) or camera_moves
+    return Exposure(shutter, anchor, anchor_view, travel, still, tuple(restless), has_times, (anchor_frame,))
 
 
 def shutter_interval(scene: Scene, technique: Technique) -> tuple[float, float]:
@@ -89,12 +97,31 @@ def _anchor_frame(scene: Scene, frame: int) -> int:
     step = float(np.linalg.norm(camera.velocity)) / scene.animation.fps
     if step == 0.0:
         return 0
-    reach = float(np.linalg.norm(np.subtract(camera.target, camera.position)))
-    interval = int(max(1.0, min(reach / step, 1e9)))
+    interval = int(max(1.0, min(_reach(scene) / step, 1e9)))
     return frame // interval * interval
 
 
-def _layer_depth(bodies: Sequence[Body], view: View) -> float:
-    """Return the distance that layers under parallel rays are a share of: the farthest resting vertex from the eye."""
-    far = [float(np.abs(b.vertices + b.origin - view.origin).max()) for b in bodies if b.layer and len(b.vertices)]
-    return max(far, default=1.0)
+def _reach(scene: Scene) -> float:
+    return float(np.linalg.norm(np.subtract(scene.camera.target, scene.camera.position)))
+
+
+def _layer_depth(bodies: Sequence[Body], view: View, travel: float) -> float:
+    """Return the distance that layers under parallel rays are a share of: the greatest depth, or half width of what
+    can be seen, of anything with a layer at rest.
+
+    What of it is out of sight does not count, or a sheet that reaches far out would be brought behind the camera.
+    """
+    if view.perspective:
+        return 1.0
+    wide = _WIDEST * (max(view.width, view.height) / view.scale + travel)
+    far = 0.0
+    for body in bodies:
+        if not body.layer or not len(body.triangles):
+            continue
+        place = view.to_camera(body.vertices + body.origin)[body.triangles]
+        normal = np.cross(place[:, 1] - place[:, 0], place[:, 2] - place[:, 0])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            seen = np.abs((normal * place[:, 0]).sum(axis=1)) + wide * np.abs(normal[:, :2]).sum(axis=1)
+            depth = np.fmin(seen / np.abs(normal[:, 2]), np.abs(place[..., 2]).max(axis=1))
+        far = max(far, float(depth.max()), min(wide, float(np.abs(place[..., :2]).max())))
+    return far or 1.0

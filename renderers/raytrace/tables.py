@@ -233,6 +233,11 @@ class Ownership:
     values: FloatArray
     counts: tuple[int, ...]
 
+    def of_parts(self, parents: NDArray[np.int64]) -> "Ownership":
+        """Return the ownership of one mesh's parts, each a part of the triangle of that number."""
+        values = self.values[parents] if len(self.values) else self.values
+        return Ownership(self.owners[parents], values, (len(parents),))
+
 
 def build_ownership(meshes: Sequence[Mesh], *, placed: bool) -> Ownership:
     """Return what hits on meshes are looked up by, the meshes' triangles one after the other.

@@ -18,6 +18,7 @@ from aliasbench.renderers.geometry import build_bodies
 from aliasbench.renderers.lights import light_values, with_lights
 from aliasbench.renderers.raytrace.allocation import error_exponent
 from aliasbench.renderers.raytrace.bodies import BODY_SIZE, body_values
+from aliasbench.renderers.raytrace.cutting import cut_large, edge_on, without
 from aliasbench.renderers.raytrace.development import Development, Room, is_plain, make_optics
 from aliasbench.renderers.raytrace.edge_on import keeps_planes, without_edge_on
 from aliasbench.renderers.raytrace.exposure import Exposure, plan_exposure
@@ -143,6 +144,7 @@ class PreparedRaytrace:
         "_bodies",
         "_engine",
         "_footprint",
+        "_hidden",
         "_is_plain",
         "_is_scattered",
         "_looks",
@@ -156,6 +158,7 @@ class PreparedRaytrace:
         "_size",
         "_still",
         "_technique",
+        "_whole",
     )
 
     def __init__(
@@ -172,6 +175,7 @@ class PreparedRaytrace:
         self._placed = self._looks.textured or self._is_scattered
         self._footprint = float(technique.shading_samples) ** -0.5
         self._mesh_key: tuple[int, ...] = ()
+        self._hidden = np.zeros(0, np.int64)
         self._still = self._moving = build_ownership((), placed=False)
         self._optics = make_optics(technique, size[0])
         self._room = Room()
@@ -204,14 +208,34 @@ class PreparedRaytrace:
 
     def _place(self, exposure: Exposure) -> None:
         """Give the engine the still mesh of an exposure, unless it has it."""
-        if exposure.mesh_key == self._mesh_key:
+        known = exposure.mesh_key == self._mesh_key
+        if known and self._scene.camera.is_static:
             return
-        mesh = merge_bodies(self._scene, self._looks, exposure.still, exposure.shutter, exposure.anchor)
+        if not known:
+            self._whole = merge_bodies(self._scene, self._looks, exposure.still, exposure.shutter, exposure.anchor)
+        hidden = self._find_edge_on(exposure)
+        if known and np.array_equal(hidden, self._hidden):
+            return
+        mesh, kept = (self._whole, None) if not len(hidden) else without(self._whole, hidden)
+        mesh, parents = cut_large(mesh, exposure.anchor_view, exposure.anchor, exposure.travel)
         # light comes from all sides; a camera sees only what faces it
-        only_seen = not self._is_scattered and keeps_planes(self._scene.camera)
-        self._engine.set_still(without_edge_on(mesh, exposure.shutter.first, exposure.anchor) if only_seen else mesh)
-        self._still = build_ownership((mesh,), placed=self._placed)
-        self._mesh_key = exposure.mesh_key
+        if not self._is_scattered and keeps_planes(self._scene.camera):
+            mesh = without_edge_on(mesh, exposure.shutter.first, exposure.anchor)
+        self._engine.set_still(mesh)
+        # a part has its whole triangle's plane and texture map, which its own corners know less well
+        still = build_ownership((self._whole,), placed=self._placed)
+        for chosen in (kept, parents):
+            still = still if chosen is None else still.of_parts(chosen)
+        self._still, self._hidden, self._mesh_key = still, hidden, exposure.mesh_key
+
+    def _find_edge_on(self, exposure: Exposure) -> NDArray[np.int64]:
+        """Return the triangles of the still mesh that a pinhole sees nothing of; those that cast shadows stay."""
+        camera, shutter = self._scene.camera, exposure.shutter
+        moves = shutter.opening != shutter.closing and not camera.is_static
+        if camera.projection != "perspective" or camera.lens_radius > 0.0 or moves or self._is_scattered:
+            return np.zeros(0, np.int64)
+        flat = np.array([s.is_polygon for s in self._scene.objects], dtype=bool)
+        return edge_on(self._whole, shutter.first.origin - exposure.anchor, flat)
 
     def _expose(
         self, exposure: Exposure, start: int, progress: Progress | None
