@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 
 from aliasbench.renderers.geometry import LAYER_STEP, Body
 from aliasbench.renderers.lights import OFF_SURFACE
+from aliasbench.renderers.raster.cutting import cut_side
 from aliasbench.renderers.raster.graphics import GraphicsContext, GraphicsError, read_shader
-from aliasbench.renderers.raster.guard import cut_side
 from aliasbench.renderers.raster.minification import Shading, piece_coordinates
 from aliasbench.renderers.raster.projection import DepthRule, Window, view_matrix
 from aliasbench.renderers.raster.shaders import scene_shader

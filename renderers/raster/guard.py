@@ -5,8 +5,10 @@ The device rounds every vertex to float32 and cuts triangles at the picture's bo
 here, pass by pass, cut to a frustum a little wider than the picture, and handed over in clip space. Everything else
 goes the device's own way. Objects as a whole, so that triangles which share an edge are treated alike.
 
-Two borderline cases also need float64: a perspective camera in a polygon's plane sees nothing of it, and an
-orthographic one sees a surface at depth 0 (visible: depth >= 0).
+Three more cases need float64: a perspective camera in a polygon's plane sees nothing of it; an orthographic one sees a
+surface at depth 0 (visible: depth >= 0); and where objects lie on top of each other in one plane, a triangle's depth is
+rounded by a share of its greatest one, which where it is nearest may be more than what tells layers apart. There
+polygons are cut into shells of depth.
 """
 
 from collections.abc import Sequence
@@ -16,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aliasbench.renderers.geometry import Body
+from aliasbench.renderers.raster.cutting import DEEP, cut_shells, cut_side
 from aliasbench.renderers.raster.placement import Placement
 from aliasbench.scenes.errors import InputError
 from aliasbench.scenes.model import FloatArray, Scene
@@ -68,6 +71,7 @@ class Guard:
         self._perspective = scene.camera.projection == "perspective"
         self._polygon = np.array([s.is_polygon for s in scene.objects], dtype=bool)
         self._limit = _REACH / max(size)
+        self._layered = any(b.layer for b in self._bodies)
         still = scene.camera.is_static and scene.camera.lens_radius == 0.0
         self._changing = np.array([not (still and b.motion.is_static) for b in self._bodies], dtype=bool)
         self._steady: BoolArray | None = None
@@ -80,7 +84,10 @@ class Guard:
             self._steady = self._find(matrices, np.flatnonzero(~self._changing))
         if not self._changing.any():
             return self._steady
-        doubtful = self._changing & ~_surely_near(matrices, self._boxes, self._limit, self._perspective)
+        near = _surely_near(matrices, self._boxes, self._limit, self._perspective)
+        if self._layered:
+            near &= _surely_shallow(matrices, self._boxes, self._perspective)
+        doubtful = self._changing & ~near
         return self._find(matrices, np.flatnonzero(doubtful)) if doubtful.any() else self._steady
 
     def _find(self, matrices: FloatArray, numbers: NDArray[np.int64]) -> BoolArray:
@@ -88,7 +95,8 @@ class Guard:
         for number in numbers.tolist():
             body = self._bodies[number]
             flat = self._polygon[body.surfaces]
-            found = _far_triangles(body, matrices[number], self._boxes[number], self._limit, flat, self._perspective)
+            box, layered = self._boxes[number], flat & self._layered
+            found = _far_triangles(body, matrices[number], box, self._limit, flat, layered, self._perspective)
             out[body.surfaces[found]] = True
         return out
 
@@ -106,6 +114,8 @@ class Guard:
             chosen = far[body.surfaces]
             if chosen.any():
                 cut, owners = _cut_body(body, matrix, chosen, self._polygon, self._perspective)
+                if self._layered:
+                    cut, owners = cut_shells(cut, owners, self._perspective)
                 cut[..., 6] += first
                 corners.append(cut)
                 surfaces.append(owners)
@@ -133,10 +143,25 @@ def _surely_near(matrices: FloatArray, boxes: FloatArray, limit: float, perspect
     return bounded & (reach < limit) & (np.abs(matrices[:, 2, 3]) * (1 - _SURE) > spread[:, 2] * (1 + _SURE))
 
 
+def _surely_shallow(matrices: FloatArray, boxes: FloatArray, perspective: bool) -> BoolArray:
+    """Return for every body whether its box alone shows that none of its triangles is deep."""
+    row = 3 if perspective else 2
+    spread = (np.abs(matrices[:, row, :3]) * boxes).sum(axis=1)
+    middle = matrices[:, row, 3]
+    out: BoolArray = middle + spread <= DEEP * (middle - spread)
+    return out
+
+
 def _far_triangles(
-    body: Body, matrix: FloatArray, box: FloatArray, limit: float, flat: BoolArray, perspective: bool
+    body: Body,
+    matrix: FloatArray,
+    box: FloatArray,
+    limit: float,
+    flat: BoolArray,
+    layered: BoolArray,
+    perspective: bool,
 ) -> BoolArray:
-    """Return which triangles of a body are far; `flat` says which belong to polygons."""
+    """Return which triangles of a body are far; `flat` says which belong to polygons, `layered` where layers matter."""
     if np.abs(matrix).max() > _HUGE:
         return np.ones(len(body.triangles), dtype=bool)
     most = np.abs(matrix[:, :3]) @ box + np.abs(matrix[:, 3])
@@ -147,16 +172,19 @@ def _far_triangles(
         out = close[body.triangles].any(axis=1) | flat | (reach > _HUGE)
     elif reach < limit:
         at_camera = np.abs(body.vertices @ matrix[2, :3] + matrix[2, 3]) <= _SURE * most[2]
-        out = at_camera[body.triangles].all(axis=1)
+        out = at_camera[body.triangles].all(axis=1) | layered
     else:
         out = np.ones(len(body.triangles), dtype=bool)
     chosen = np.flatnonzero(out)
     if len(chosen):
-        out[chosen] = _far(body.vertices[body.triangles[chosen]], matrix, limit, flat[chosen], perspective)
+        corners = body.vertices[body.triangles[chosen]]
+        out[chosen] = _far(corners, matrix, limit, flat[chosen], layered[chosen], perspective)
     return out
 
 
-def _far(corners: FloatArray, matrix: FloatArray, limit: float, flat: BoolArray, perspective: bool) -> BoolArray:
+def _far(
+    corners: FloatArray, matrix: FloatArray, limit: float, flat: BoolArray, layered: BoolArray, perspective: bool
+) -> BoolArray:
     """Return which triangles with these corners (m, 3, 3) are far."""
     place = corners @ matrix[:, :3].T + matrix[:, 3]
     terms = _terms(corners, matrix)
@@ -168,16 +196,18 @@ def _far(corners: FloatArray, matrix: FloatArray, limit: float, flat: BoolArray,
         for sign in (1.0, -1.0):
             hidden |= (sign * place[..., axis] > _WIDTH * w + slack).all(axis=1)
     huge: BoolArray = reach > _HUGE
+    depth = w if perspective else place[..., 2]
+    deep = layered & (depth.max(axis=1) > DEEP * np.maximum(depth.min(axis=1), 0.0))
     if not perspective:
         at_camera = (np.abs(place[..., 2]) <= _SURE * terms[..., 2]).all(axis=1)
-        return huge | (~hidden & ((reach > limit) | at_camera))
+        return huge | (~hidden & ((reach > limit) | at_camera | deep))
     hidden |= (w < -slack).all(axis=1)
     height, normal = _plane(place)
     # what is seen of the plane n . (a w, b w, w) = height has |a|, |b| <= _WIDTH
     widest = _WIDTH * (normal[:, 0] + normal[:, 1]) + normal[:, 2]
     nearest = np.maximum(w.min(axis=1) * widest, height)
     edge_on = flat & (height <= _SURE * reach * normal.max(axis=1))
-    return huge | (~hidden & ((reach * widest > limit * nearest) | edge_on))
+    return huge | (~hidden & ((reach * widest > limit * nearest) | edge_on | deep))
 
 
 def _terms(points: FloatArray, matrix: FloatArray) -> FloatArray:
@@ -227,46 +257,3 @@ def _check_size(place: FloatArray, owners: NDArray[np.int32], sides: Sequence[Se
             f"object {owners[beyond[0]]} reaches {reach[beyond[0]] / 2:.3g} pictures far; "
             f"the rasterizer places up to {_MOST / 2:.3g}; use a larger camera height"
         )
-
-
-def cut_side(
-    corners: FloatArray, owners: NDArray[np.int32], side: Sequence[float]
-) -> tuple[FloatArray, NDArray[np.int32]]:
-    """Return what of triangles (m, 3, n) lies where `side` . (x, y, z, w) >= 0, as triangles, and their objects."""
-    distance = corners[..., :4] @ np.asarray(side)
-    inside = distance >= 0.0
-    count = inside.sum(axis=1)
-    kept = count == 3
-    one, two = np.flatnonzero(count == 1), np.flatnonzero(count == 2)
-    tips, tip_distance = _turned(corners, distance, one, inside[one])
-    bases, base_distance = _turned(corners, distance, two, ~inside[two])
-    a, b, c = bases[:, 0], bases[:, 1], bases[:, 2]
-    left, right = (
-        _crossing(b, a, base_distance[:, 1], base_distance[:, 0]),
-        _crossing(c, a, base_distance[:, 2], base_distance[:, 0]),
-    )
-    small = [_crossing(tips[:, 0], tips[:, k], tip_distance[:, 0], tip_distance[:, k]) for k in (1, 2)]
-    out = np.concatenate(
-        [
-            corners[kept],
-            np.stack([tips[:, 0], *small], axis=1),
-            np.stack([left, b, c], axis=1),
-            np.stack([left, c, right], axis=1),
-        ]
-    )
-    return out, np.concatenate([owners[kept], owners[one], owners[two], owners[two]])
-
-
-def _turned(
-    corners: FloatArray, distance: FloatArray, chosen: NDArray[np.int64], lone: BoolArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return the chosen triangles and distances with the lone corner first, in the same sense of rotation."""
-    order = (np.argmax(lone, axis=1)[:, None] + np.arange(3)) % 3
-    return corners[chosen[:, None], order], distance[chosen[:, None], order]
-
-
-def _crossing(inner: FloatArray, outer: FloatArray, d_inner: FloatArray, d_outer: FloatArray) -> FloatArray:
-    """Return where edges cross a side, always reckoned from inside: neighbours get the very same point."""
-    share = d_inner / (d_inner - d_outer)
-    out: FloatArray = inner + share[:, None] * (outer - inner)
-    return out
