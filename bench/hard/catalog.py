@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 
 from aliasbench.bench.hard import (
+    coplanar,
     depth,
     edges,
     footprints,
@@ -10,10 +11,12 @@ from aliasbench.bench.hard import (
     motion,
     moving_edges,
     scale,
+    shapes,
     shared_edges,
     sizes,
     texel_lines,
     values,
+    viewpoints,
 )
 from aliasbench.bench.hard.case import HardCase
 
@@ -22,6 +25,9 @@ _GROUPS = (
     moving_edges.CASES,
     shared_edges.CASES,
     texel_lines.CASES,
+    shapes.CASES,
+    coplanar.CASES,
+    viewpoints.CASES,
     scale.CASES,
     depth.CASES,
     footprints.CASES,

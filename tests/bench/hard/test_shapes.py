@@ -1,0 +1,146 @@
+"""The hard cases of shapes and viewpoints: their outcomes, and that each kind of check can fail."""
+
+import dataclasses
+from functools import partial
+from typing import Any
+
+import numpy as np
+import pytest
+
+from aliasbench.bench.hard import coplanar, placing, shapes, viewpoints
+from aliasbench.bench.hard.case import EGL, FAST, OSMESA, PORTABLE, REFERENCE, TRACER
+from aliasbench.bench.hard.painting import SNAPPED_PX, Painting, paint
+from aliasbench.bench.hard.placing import BLUE, ORANGE, SIZE, Setting, camera, flat, misplaced
+from aliasbench.renderers.frame import Frame
+from aliasbench.scenes.model import Scene
+from aliasbench.scenes.shapes import mesh
+
+CASES = {case.name: case for case in (*shapes.CASES, *coplanar.CASES, *viewpoints.CASES)}
+# Every other answer is "ok".
+LIMITS = {
+    "sliver-samples": {TRACER, FAST, PORTABLE, EGL, OSMESA},
+    "coplanar": {EGL, OSMESA},
+    "coplanar-moving": {EGL, OSMESA},
+    "coplanar-ground": {TRACER, PORTABLE, EGL, OSMESA},
+    "behind-camera": {EGL, OSMESA},
+    "inside-box": {EGL, OSMESA},
+    "very-near": {TRACER, FAST, PORTABLE, EGL, OSMESA},
+}
+# What is slow is asked for less of.
+REDUCED: dict[tuple[str, str], Any] = {
+    **{
+        ("sliver-light", s): partial(shapes._sliver_light, powers=(2, 5)) for s in (TRACER, FAST, PORTABLE, EGL, OSMESA)
+    },
+    ("sliver-light", REFERENCE): partial(shapes._sliver_light, powers=(1,)),
+}
+
+
+@pytest.mark.parametrize(("name", "subject"), [(c.name, s) for c in CASES.values() for s in c.subjects])
+def test_every_case_has_its_outcome(name: str, subject: str) -> None:
+    verdict = REDUCED.get((name, subject), CASES[name].check)(subject)
+    assert verdict.outcome == ("limit" if subject in LIMITS.get(name, ()) else "ok"), verdict
+
+
+def test_a_painting_covers_and_shows_what_its_outlines_say() -> None:
+    low = np.array([(1.25, 1.0), (4.5, 1.0), (4.5, 3.0), (1.25, 3.0)])
+    high = np.array([(3.0, 0.0), (6.0, 0.0), (6.0, 2.5), (3.0, 2.5)])
+    painting = Painting((8, 4), (low, high), (ORANGE, BLUE), (0.0, 0.0, 0.0))
+    coverage = painting.coverage()
+    # sums of exact binary fractions, cut by exact coordinates
+    np.testing.assert_allclose(coverage[1, 1], 0.75 * np.array(ORANGE), atol=1e-15)
+    np.testing.assert_allclose(coverage[2, 3], 0.5 * np.array(BLUE) + 0.5 * np.array(ORANGE), atol=1e-15)
+    np.testing.assert_allclose(coverage[2, 4], 0.5 * np.array(BLUE) + 0.25 * np.array(ORANGE), atol=1e-15)
+    shown = painting.color_at(np.array([(2.0, 2.0), (3.5, 2.0), (7.0, 3.5)]))
+    np.testing.assert_array_equal(shown, [ORANGE, BLUE, (0.0, 0.0, 0.0)])
+
+
+def test_a_wrong_colour_counts_as_far_as_it_is_from_where_it_is_seen() -> None:
+    left = np.array([(-1.0, -1.0), (3.0, -1.0), (3.0, 5.0), (-1.0, 5.0)])
+    painting = Painting((8, 4), (left,), (ORANGE,), (0.0, 0.0, 0.0))
+    picture = painting.color_at(np.stack(np.meshgrid(np.arange(8) + 0.5, np.arange(4) + 0.5), -1).reshape(-1, 2))
+    picture = picture.reshape(4, 8, 3)
+    assert painting.apart(picture).max() == 0.0
+    picture[1, 5] = ORANGE  # its centre is 2.5 px from the region
+    picture[2, 1] = 0.0
+    assert sorted(painting.apart(picture))[-2:] == pytest.approx([1.5, 2.5], abs=1e-12)
+    picture[0, 0] = BLUE
+    assert painting.apart(picture).max() == 1e9
+
+
+def test_a_polygon_through_the_camera_s_plane_is_painted_to_its_horizon() -> None:
+    seen = next(s for s in viewpoints.passing_settings() if s.name == "perspective straight floor")
+    painting = seen.painting()
+    assert len(painting.outlines) == 1  # what lies behind the camera is nowhere
+    assert 0.05 < (painting.coverage() > 0).any(axis=2).mean() < 0.9
+
+
+def _shifted(monkeypatch: pytest.MonkeyPatch, by: int) -> None:
+    real = placing.render
+
+    def render(*args: Any, **options: Any) -> Frame:
+        frame = real(*args, **options)
+        return dataclasses.replace(frame, pixels=np.roll(frame.pixels, by, axis=1))
+
+    monkeypatch.setattr(placing, "render", render)
+
+
+@pytest.mark.parametrize("subject", [TRACER, EGL, REFERENCE])
+@pytest.mark.parametrize(
+    "name",
+    ["sliver-samples", "many-vertices", "huge-polygon", "coplanar", "behind-camera", "edge-on-polygon", "inside-box"],
+)
+def test_a_picture_that_is_shifted_by_a_pixel_fails(monkeypatch: pytest.MonkeyPatch, name: str, subject: str) -> None:
+    _shifted(monkeypatch, 1)
+    assert CASES[name].check(subject).outcome == "failed"
+
+
+@pytest.mark.parametrize("subject", [TRACER, EGL, REFERENCE])
+def test_a_wrong_winner_fails(subject: str) -> None:
+    stack = coplanar.stack_settings((60.0,))[0]
+    turned = dataclasses.replace(stack.scene, objects=stack.scene.objects[::-1])
+    assert misplaced(subject, [dataclasses.replace(stack, scene=turned, truth=stack.scene)]).outcome == "failed"
+
+
+def test_layers_that_are_drawn_in_the_wrong_order_fail_on_the_ground(monkeypatch: pytest.MonkeyPatch) -> None:
+    real = coplanar.render
+
+    def render(scene: Scene, *args: Any, **options: Any) -> Frame:
+        return real(dataclasses.replace(scene, objects=scene.objects[::-1]), *args, **options)
+
+    monkeypatch.setattr(coplanar, "render", render)
+    assert CASES["coplanar-ground"].check(EGL).outcome == "failed"
+
+
+@pytest.mark.parametrize("subject", [TRACER, EGL, REFERENCE])
+def test_a_triangle_with_an_area_is_noticed(monkeypatch: pytest.MonkeyPatch, subject: str) -> None:
+    clean = shapes.degenerate_meshes()[0]
+    more = mesh([*clean.vertices, (12.0, 0.0, 0.0)], [*clean.triangles, (1, 2, 4)], color=clean.color)
+    monkeypatch.setattr(shapes, "degenerate_meshes", lambda: (clean, more))
+    assert CASES["degenerate-triangles"].check(subject).outcome == "failed"
+    assert CASES["degenerate-files"].check(subject).outcome == "failed"
+
+
+def test_an_empty_picture_proves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    _, odd = shapes.degenerate_meshes()
+    away = mesh(odd.vertices + 1e3, odd.triangles, color=odd.color)
+    monkeypatch.setattr(shapes, "degenerate_meshes", lambda: (away, away))
+    assert CASES["degenerate-triangles"].check(TRACER).outcome == "failed"
+
+
+@pytest.mark.parametrize("share", [1.05, 0.95])
+def test_slivers_of_another_area_fail(monkeypatch: pytest.MonkeyPatch, share: float) -> None:
+    def hatch(width: float, seed: int) -> tuple[Scene, float]:
+        scene, area = real(width, seed)
+        return scene, share * area
+
+    real = shapes.sliver_hatch
+    monkeypatch.setattr(shapes, "sliver_hatch", hatch)
+    # a twentieth of a coverage of .11 at a standard error of at most 7e-4: eight of them
+    assert shapes._sliver_light(TRACER, powers=(2,)).outcome == "failed"
+
+
+def test_the_snapped_bound_is_half_a_subpixel_step_each_way() -> None:
+    assert np.hypot(1 / 512, 1 / 512) == SNAPPED_PX
+    square = Scene("square", camera("orthographic"), (flat([(-2, -2), (2, -2), (2, 2), (-2, 2)], ORANGE),))
+    assert paint(square, SIZE).coverage().sum() == pytest.approx(16 * 1.5, abs=1e-12)
+    assert misplaced(TRACER, [Setting("square", square)]).outcome == "ok"
