@@ -11,6 +11,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from aliasbench.renderers.kernel_parts import allocating, called
 from aliasbench.renderers.reference.coverage import row_extent
 from aliasbench.renderers.reference.placement import Movers, place_faces, room_for
 from aliasbench.renderers.reference.slabs import TIE
@@ -159,7 +160,7 @@ def measure_across(slices: Slices, movers: Movers) -> None:
     np.minimum(slices.across, slices.reach, out=slices.across)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+@allocating
 def mark_row(slices: Slices, s: int, row: int, width: int, marks: Marks) -> None:
     """Fill the marks of a row in slice s."""
     marks.edges[:] = 0
@@ -207,7 +208,7 @@ def mark_row(slices: Slices, s: int, row: int, width: int, marks: Marks) -> None
                     marks.active[column] = True
 
 
-@njit(cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+@allocating
 def _mark_edges(slices: Slices, i: int, length: float, row: int, width: int, marks: Marks) -> None:
     """Mark what the outlines of one piece come near."""
     starts, points = slices.starts, slices.points
@@ -249,7 +250,7 @@ def _mark_edges(slices: Slices, i: int, length: float, row: int, width: int, mar
                 marks.speed[column] = max(marks.speed[column], speed)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+@called
 def within(a: float, b: float, low: float, high: float) -> tuple[float, float]:
     """Return the range of t in [0, 1] in which a + t (b - a) lies in [low, high], a little widened."""
     if abs(b - a) < 1e-9:
@@ -260,7 +261,7 @@ def within(a: float, b: float, low: float, high: float) -> tuple[float, float]:
     return max(0.0, t - 1e-9), min(1.0, u + 1e-9)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+@called
 def _may_swap(slices: Slices, i: int, j: int, length: float, x0: int, x1: int, row: int) -> bool:
     """Return whether two planes may change their order over columns [x0, x1) of a row.
 
@@ -285,7 +286,7 @@ def _may_swap(slices: Slices, i: int, j: int, length: float, x0: int, x1: int, r
     return not (low - rate > 0.0 or high + rate < 0.0)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+@called
 def _change(
     nearness: float, steep: float, near: float, turn: float, ray: float, perspective: bool, scale: float, length: float,
 ) -> float:  # fmt: skip

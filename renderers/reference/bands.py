@@ -10,6 +10,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from aliasbench.renderers.kernel_parts import allocating
 from aliasbench.renderers.reference.activity import Marks, Slices, mark_row
 from aliasbench.renderers.reference.cellvalues import Blur, Shades, block_of
 from aliasbench.renderers.reference.panels import Contacts, Panels, integrate_cell, look
@@ -319,7 +320,7 @@ def integrate_row(
     return looks
 
 
-@njit(cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+@allocating
 def _more(values: FloatArray) -> FloatArray:
     out = np.empty((2 * len(values), values.shape[1]))
     for i in range(len(values)):
@@ -328,7 +329,7 @@ def _more(values: FloatArray) -> FloatArray:
     return out
 
 
-@njit(cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+@allocating
 def _more_whole(values: IntArray) -> IntArray:
     out = np.empty((2 * len(values), values.shape[1]), np.int64)
     for i in range(len(values)):

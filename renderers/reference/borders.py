@@ -8,9 +8,9 @@ run, along its right side.
 """
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from aliasbench.renderers.kernel_parts import allocating
 from aliasbench.renderers.reference.coverage import MANY_LINES, MAX_LEVEL, select_pieces
 from aliasbench.renderers.reference.slabs import front_owner, gather_lines
 from aliasbench.scenes.model import FloatArray
@@ -22,7 +22,7 @@ BASE, COUNT = 0, 1  # places in the state of a pixel being traced
 _UNSET = -1
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@allocating
 def trace_pixel(
     points: FloatArray, starts: IntArray, planes: FloatArray, owners: IntArray, shades: IntArray, perspective: bool,
     extent: float, cand: IntArray, n: int, X: float, Y: float, state: IntArray, runs: FloatArray, sides: IntArray,
@@ -88,7 +88,7 @@ def trace_pixel(
     return runs, sides
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@allocating
 def _with_room(runs: FloatArray, sides: IntArray, needed: int) -> tuple[FloatArray, IntArray]:
     """Return arrays that hold at least `needed` rows, with the rows of the given ones."""
     if needed <= len(runs):
@@ -101,7 +101,7 @@ def _with_room(runs: FloatArray, sides: IntArray, needed: int) -> tuple[FloatArr
     return more_runs, more_sides
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@allocating
 def _trace_cell(
     points: FloatArray, starts: IntArray, planes: FloatArray, owners: IntArray, shades: IntArray, perspective: bool,
     extent: float, kept: IntArray, edges: IntArray, here: int, lines: int, X: float, Y: float, ox: float, oy: float,
@@ -171,7 +171,7 @@ def _trace_cell(
     return runs, sides
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@allocating
 def _go_on(
     line: FloatArray, e: int, nl: int, top: float, bottom: float, ox: float, oy: float, size: float, left: int,
     right: int, under_way: BoolArray, run: FloatArray, between: IntArray, state: IntArray, runs: FloatArray,
@@ -197,7 +197,7 @@ def _go_on(
     return runs, sides
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@allocating
 def _finish(
     e: int, run: FloatArray, between: IntArray, state: IntArray, runs: FloatArray, sides: IntArray,
 ) -> tuple[FloatArray, IntArray]:  # fmt: skip

@@ -1,11 +1,10 @@
 """Small exact pieces of arithmetic for lines inside a cell: doubled precision, crossings and sorting."""
 
-from numba import njit
-
+from aliasbench.renderers.kernel_parts import called
 from aliasbench.scenes.model import FloatArray
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def _two_difference(a: float, b: float) -> tuple[float, float]:
     """Return a - b rounded, and what the rounding lost (Knuth)."""
     s = a - b
@@ -13,7 +12,7 @@ def _two_difference(a: float, b: float) -> tuple[float, float]:
     return s, (a - (s - t)) - (b + t)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def _two_product(a: float, b: float) -> tuple[float, float]:
     """Return a b rounded, and what the rounding lost (Dekker's splitting; fine below 1e150)."""
     p = a * b
@@ -26,7 +25,7 @@ def _two_product(a: float, b: float) -> tuple[float, float]:
     return p, ((ah * bh - p) + ah * bl + al * bh) + al * bl
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def local_line(x0: float, y0: float, x1: float, y1: float, X: float, Y: float) -> tuple[float, float]:
     """Return (c, m) of the line x = c + m y through two points, both relative to the corner (X, Y); y0 < y1.
 
@@ -52,7 +51,7 @@ def local_line(x0: float, y0: float, x1: float, y1: float, X: float, Y: float) -
     return c, m
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def cross_lines(line: FloatArray, n: int, size: float, events: FloatArray, count: int) -> int:
     """Append the heights in (0, size) where lines end, meet the cell's sides or each other; return the new count."""
     for i in range(n):
@@ -77,7 +76,7 @@ def cross_lines(line: FloatArray, n: int, size: float, events: FloatArray, count
     return count
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def sort_prefix(values: FloatArray, n: int) -> None:
     """Sort the first n values in place (Shell's way: plain insertion for a few)."""
     gap = 1

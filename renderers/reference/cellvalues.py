@@ -5,9 +5,9 @@ what it adds to each of the pixels around.
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from aliasbench.renderers.kernel_parts import allocating
 from aliasbench.renderers.reference.borders import BASE, COUNT, trace_pixel
 from aliasbench.renderers.reference.coverage import cover_pixel
 from aliasbench.renderers.reference.masses import cell_masses, cell_peaks, rules_of, run_masses
@@ -87,14 +87,14 @@ class Block(NamedTuple):
     columns: int
 
 
-@njit(cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+@allocating
 def block_of(row: int, column: int, margin: int, height: int, width: int) -> Block:
     """Return what a cell reaches in a picture of a size; rows or columns may be 0."""
     top, left = max(row - 2 * margin, 0), max(column - 2 * margin, 0)
     return Block(row, column, top, left, max(0, min(row + 1, height) - top), max(0, min(column + 1, width) - left))
 
 
-@njit(cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+@allocating
 def fill_value(
     points: FloatArray, starts: IntArray, planes: FloatArray, owners: IntArray, perspective: bool, extent: float,
     cand: IntArray, n: int, block: Block, shades: Shades, blur: Blur | None,

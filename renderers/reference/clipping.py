@@ -4,9 +4,9 @@ Whatever two faces have in common is computed from the same numbers in the same 
 """
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from aliasbench.renderers.kernel_parts import called
 from aliasbench.scenes.model import FloatArray
 
 IntArray = NDArray[np.int64]
@@ -20,7 +20,7 @@ EDGE_ON = 16 * 2.0**-52  # distance from the eye of a plane, over that of a corn
 ONE_CORNER = 4 * 2.0**-52  # corners this near, over the width of the picture, are one up to rounding
 
 
-@njit(cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+@called
 def cut_polygon(
     points: FloatArray, n: int, plane: int, half: FloatArray, near: float, perspective: bool, out: FloatArray,
 ) -> int:  # fmt: skip
@@ -50,7 +50,7 @@ def cut_polygon(
     return size
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def merge_corners(points: FloatArray, n: int, close: float, kept: IntArray) -> int:
     """Join corners of a loop that are one up to rounding, as cuts near a corner of the picture leave.
 
@@ -80,14 +80,14 @@ def merge_corners(points: FloatArray, n: int, close: float, kept: IntArray) -> i
     return size
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def _take_first(points: FloatArray, k: int, i: int) -> None:
     ahead = points[i, 0] < points[k, 0] or (points[i, 0] == points[k, 0] and points[i, 1] < points[k, 1])
     if ahead:
         points[k, 0], points[k, 1] = points[i, 0], points[i, 1]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+@called
 def _follows(a: FloatArray, b: FloatArray) -> bool:
     """Return whether a comes after b in the order of x, then y, then z."""
     for c in range(3):
@@ -96,7 +96,7 @@ def _follows(a: FloatArray, b: FloatArray) -> bool:
     return False
 
 
-@njit(cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+@called
 def inside_plane(p: FloatArray, plane: int, half: FloatArray, near: float, perspective: bool) -> float:
     """Return the signed distance (up to a factor) to the near plane (0) or a side of the picture (1 to 4)."""
     if plane == 0:
@@ -106,22 +106,22 @@ def inside_plane(p: FloatArray, plane: int, half: FloatArray, near: float, persp
     return reach - value if plane % 2 else reach + value
 
 
-@njit(cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+@called
 def minus(a: FloatArray, b: FloatArray) -> Triple:
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+@called
 def cross(a: Triple, b: Triple) -> Triple:
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+@called
 def dot(a: Triple, b: Triple | FloatArray) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+@called
 def nearness_plane(o: FloatArray, n: Triple, perspective: bool) -> tuple[bool, float, float, float]:
     """Return whether a plane through o with normal n is seen other than edge-on, and the coefficients of its nearness.
 
@@ -138,7 +138,7 @@ def nearness_plane(o: FloatArray, n: Triple, perspective: bool) -> tuple[bool, f
     return True, n[0] / n[2], n[1] / n[2], -d / n[2]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def face_planes(
     camera: FloatArray, uv: FloatArray, spread: IntArray, perspective: bool, scale: float, cx: float, cy: float,
     out: FloatArray,
@@ -165,13 +165,15 @@ def face_planes(
             # P = (X, Y, -nearness)
             to_picture(g[0] - g[2] * near_x, g[1] - g[2] * near_y, rest - g[2] * near_1, scale, cx, cy, out[1 + c])
     if perspective:
-        out[3] = out[0]
+        # one by one: a slice would take as long to compile as all of this
+        for c in range(3):
+            out[3, c] = out[0, c]
     else:
         out[3, 0], out[3, 1], out[3, 2] = 0.0, 0.0, 1.0
     return True
 
 
-@njit(cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+@called
 def to_picture(a: float, b: float, c: float, scale: float, cx: float, cy: float, out: FloatArray) -> None:
     out[0] = a / scale
     out[1] = -b / scale

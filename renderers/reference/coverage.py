@@ -14,6 +14,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from aliasbench.renderers.kernel_parts import allocating, called
 from aliasbench.renderers.reference.slabs import add_area, cut_slabs, nearness_at, tie_of
 from aliasbench.scenes.model import FloatArray
 
@@ -59,7 +60,7 @@ def cover_rows(
     return work
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@allocating
 def band_candidates(
     points: FloatArray, starts: IntArray, first: int, last: int, rows: IntArray
 ) -> tuple[IntArray, FloatArray, FloatArray, int]:
@@ -77,7 +78,7 @@ def band_candidates(
     return band, low, high, here
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@allocating
 def row_candidates(
     points: FloatArray, starts: IntArray, band: IntArray, low: FloatArray, high: FloatArray, here: int, row: int,
     width: int,
@@ -123,7 +124,7 @@ def row_candidates(
     return first_of, ids, alone
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def row_extent(points: FloatArray, begin: int, end: int, low: float, high: float) -> tuple[float, float]:
     """Return the least and greatest x of a convex piece between two heights."""
     lo, hi = np.inf, -np.inf
@@ -140,7 +141,7 @@ def row_extent(points: FloatArray, begin: int, end: int, low: float, high: float
     return lo - 1e-9, hi + 1e-9
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def _solid_extent(points: FloatArray, begin: int, end: int, row: int) -> tuple[float, float]:
     """Return the x range that a convex piece fills all through a row of pixels (empty: inf, -inf)."""
     lo, hi = -np.inf, np.inf
@@ -164,7 +165,7 @@ def _solid_extent(points: FloatArray, begin: int, end: int, row: int) -> tuple[f
     return np.inf, -np.inf
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@allocating
 def cover_pixel(
     points: FloatArray, starts: IntArray, planes: FloatArray, owners: IntArray, colors: FloatArray, perspective: bool,
     extent: float, cand: IntArray, n: int, x: float, y: float, total: FloatArray, comp: FloatArray,
@@ -190,7 +191,7 @@ def cover_pixel(
     return work
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@allocating
 def _cell(
     points: FloatArray, starts: IntArray, planes: FloatArray, owners: IntArray, colors: FloatArray, perspective: bool,
     extent: float, cand: IntArray, n: int, X: float, Y: float, size: float, divisible: bool, total: FloatArray,
@@ -216,7 +217,7 @@ def _cell(
     return 1
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def select_pieces(
     points: FloatArray, starts: IntArray, planes: FloatArray, owners: IntArray, perspective: bool, extent: float,
     cand: IntArray, n: int, X: float, Y: float, size: float, kept: IntArray, edges: IntArray,
@@ -246,7 +247,7 @@ def select_pieces(
     return _drop_hidden(planes, owners, perspective, extent, kept, edges, count, X, Y, size)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def _drop_hidden(
     planes: FloatArray, owners: IntArray, perspective: bool, extent: float, kept: IntArray, edges: IntArray,
     count: int, X: float, Y: float, size: float,

@@ -4,6 +4,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from aliasbench.renderers.kernel_parts import allocating, called
 from aliasbench.renderers.reference.coverage import row_extent
 from aliasbench.renderers.reference.runs import BILINEAR, GRID, SINE
 from aliasbench.renderers.reference.slabs import nearness_at, tie_of
@@ -57,7 +58,7 @@ def find_uneven(
             uneven[row, column] = jumps
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def _cross(
     one: FloatArray, other: FloatArray, perspective: bool, extent: float, xs: FloatArray, ys: FloatArray
 ) -> bool:
@@ -71,7 +72,7 @@ def _cross(
     return above < 4 and below < 4 and above + below > 0
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@allocating
 def _texture_jumps(
     plane: FloatArray, to_own: FloatArray, kind: int, size: IntArray, offset: int, alphas: FloatArray, cutoff: float,
     xs: FloatArray, ys: FloatArray,
@@ -166,7 +167,7 @@ def sample_rows(
                 out[row, column, c] += colors[-1, c] + total[c]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def _draw(u: float, edges: FloatArray) -> tuple[float, float]:
     """Return the place along an axis that a number of [0, 1) stands for, and the density there."""
     bins = len(edges) - 1
@@ -175,7 +176,7 @@ def _draw(u: float, edges: FloatArray) -> tuple[float, float]:
     return edges[at] + step * (u * bins - at), 1.0 / (bins * step)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def _holds(points: FloatArray, begin: int, end: int, x: float, y: float) -> bool:
     """Return whether a convex piece holds a point."""
     ax, ay = points[end - 1, 0] - x, points[end - 1, 1] - y
@@ -187,7 +188,7 @@ def _holds(points: FloatArray, begin: int, end: int, x: float, y: float) -> bool
     return True
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def _own(plane: FloatArray, to_own: FloatArray, x: float, y: float) -> tuple[float, float]:
     """Return where a point of the picture lies in a texture's own coordinates."""
     q = nearness_at(plane[3], x, y)
@@ -198,12 +199,12 @@ def _own(plane: FloatArray, to_own: FloatArray, x: float, y: float) -> tuple[flo
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def _wrapped(index: float, period: int) -> int:
     return int(index - np.floor(index / period) * period) % period
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def _corners(u: float, v: float, blend: bool, size: IntArray) -> tuple[int, int, int, int, float, float]:
     """Return the rows and columns of the texels that make up a value, and the shares of the second ones."""
     if not blend:
@@ -216,7 +217,7 @@ def _corners(u: float, v: float, blend: bool, size: IntArray) -> tuple[int, int,
     )  # fmt: skip
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def _alpha(
     plane: FloatArray, to_own: FloatArray, kind: int, size: IntArray, offset: int, alphas: FloatArray, x: float,
     y: float,
@@ -229,7 +230,7 @@ def _alpha(
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def _color(
     plane: FloatArray, to_own: FloatArray, kind: int, params: FloatArray, size: IntArray, offset: int,
     texels: FloatArray, x: float, y: float, value: FloatArray,

@@ -21,6 +21,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from aliasbench.renderers.kernel_parts import allocating, called
 from aliasbench.renderers.sampling.filters import GAUSSIAN, LANCZOS, FilterSpec, integral_at, profile_at
 from aliasbench.scenes.model import FloatArray
 
@@ -163,7 +164,7 @@ def disc_masses(
             out[row, column], bound[row, column] = total, error
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def _distance(x0: float, y0: float, x1: float, y1: float) -> float:
     """Return the distance of a segment from the origin."""
     dx, dy = x1 - x0, y1 - y0
@@ -172,7 +173,7 @@ def _distance(x0: float, y0: float, x1: float, y1: float) -> float:
     return math.hypot(x0 + t * dx, y0 + t * dy)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@allocating
 def _breaks(edge: FloatArray, radius: float, knots: FloatArray, cuts: FloatArray) -> int:
     """Fill the sorted angles, from -pi / 2 to pi / 2, where an edge's integral may not be smooth; return how many."""
     cuts[0], cuts[1] = -math.pi / 2, math.pi / 2
@@ -202,7 +203,7 @@ def _breaks(edge: FloatArray, radius: float, knots: FloatArray, cuts: FloatArray
     return n
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def _add_break(b: float, radius: float, cuts: FloatArray, n: int) -> int:
     if abs(b) < radius:
         cuts[n] = math.asin(b / radius)
@@ -210,7 +211,7 @@ def _add_break(b: float, radius: float, cuts: FloatArray, n: int) -> int:
     return n
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@allocating
 def _disc_part(
     edge: FloatArray, radius: float, begin: float, end: float, params: FloatArray, knots: FloatArray, longest: float,
     nodes: FloatArray, ends: FloatArray, series: FloatArray,
@@ -244,7 +245,7 @@ def _disc_part(
     return total, doubt
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@allocating
 def _along(
     edge: FloatArray, b: float, c: float, params: FloatArray, knots: FloatArray, longest: float, nodes: FloatArray,
     ends: FloatArray, series: FloatArray,
@@ -304,7 +305,7 @@ def _along(
     return sign * total
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def _twice(ends: FloatArray, series: FloatArray, x: float) -> float:
     """Return H(x), the integral of the filter's integral."""
     if x <= ends[0]:

@@ -11,9 +11,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.polynomial import chebyshev
 
+from aliasbench.renderers.kernel_parts import allocating
 from aliasbench.renderers.sampling.filters import FilterSpec
 from aliasbench.scenes.model import FloatArray, read_only
 
@@ -144,7 +144,7 @@ def _expansion(spec: FilterSpec, cuts: FloatArray, series: FloatArray, degree: i
     )  # fmt: skip
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@allocating
 def gather_row(
     moments: FloatArray, degree: int, margin: int, along: FloatArray, across: FloatArray, powers: FloatArray, row: int,
     top: int, patch: FloatArray,

@@ -20,6 +20,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from aliasbench.renderers.kernel_parts import allocating, called
 from aliasbench.renderers.reference.fragments import convex_area, copy_corners, cut_convex
 from aliasbench.renderers.reference.row_moments import walk_moments
 from aliasbench.renderers.reference.surfaces import Surfaces
@@ -71,7 +72,7 @@ def _largest_primitive(rest: FloatArray, axis: int) -> FloatArray:
     return span + np.abs(rest).max(axis=axis) / 4
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@allocating
 def crossings(poly: FloatArray, n: int, own: FloatArray) -> tuple[float, float]:
     """Return how many borders of texels the outline of a fragment crosses, about, and how many texels are within."""
     us, vs = np.empty(n), np.empty(n)
@@ -146,12 +147,12 @@ def add_mean(poly: FloatArray, n: int, own: FloatArray, bounds: FloatArray, valu
     return largest
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def _determinant(u: FloatArray, v: FloatArray, q: FloatArray) -> float:
     return u[0] * (v[1] * q[2] - v[2] * q[1]) - u[1] * (v[0] * q[2] - v[2] * q[0]) + u[2] * (v[0] * q[1] - v[1] * q[0])
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def _size(u: FloatArray, v: FloatArray, q: FloatArray) -> float:
     """Return the sum of what a determinant adds up, without signs."""
     return (
@@ -251,7 +252,7 @@ def add_footprint(
     return remainder
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@allocating
 def _add_dense(
     poly: FloatArray, n: int, own: FloatArray, block: IntArray, texels: FloatArray, primitives: FloatArray,
     means: FloatArray, value: FloatArray,

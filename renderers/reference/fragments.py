@@ -9,20 +9,21 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from aliasbench.renderers.kernel_parts import allocating, called
 from aliasbench.renderers.reference.slabs import TIE
 from aliasbench.scenes.model import FloatArray
 
 IntArray = NDArray[np.int64]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def copy_corners(poly: FloatArray, n: int, out: FloatArray) -> None:
     """Copy n corners, one by one: a slice would take a second to compile."""
     for k in range(n):
         out[k, 0], out[k, 1] = poly[k, 0], poly[k, 1]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def cut_convex(
     poly: FloatArray, n: int, a: float, b: float, c: float, ox: float, oy: float, inside: FloatArray,
     outside: FloatArray,
@@ -62,7 +63,7 @@ def cut_convex(
     return (ni if ni > 2 else 0), (no if no > 2 else 0)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@allocating
 def split_pixel(
     points: FloatArray, starts: IntArray, planes: FloatArray, owners: IntArray, perspective: bool, extent: float,
     cand: IntArray, n: int, x0: float, y0: float, x1: float, y1: float, polys: FloatArray, sizes: IntArray,
@@ -138,7 +139,7 @@ def split_pixel(
     return total
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def between(ids: IntArray, left: FloatArray, right: FloatArray, n: int, x0: float, x1: float, out: IntArray) -> int:
     """Write those of n pieces that reach into (x0, x1); return how many.
 
@@ -153,7 +154,7 @@ def between(ids: IntArray, left: FloatArray, right: FloatArray, n: int, x0: floa
     return count
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def _may_meet(points: FloatArray, begin: int, end: int, poly: FloatArray, n: int) -> bool:
     """Return False where a polygon lies beyond one edge of a piece: then nothing needs to be cut."""
     if n == 0:

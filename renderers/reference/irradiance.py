@@ -13,6 +13,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from aliasbench.renderers.kernel_parts import allocating, called
 from aliasbench.scenes.model import FloatArray
 
 IntArray = NDArray[np.int64]
@@ -42,7 +43,7 @@ def lambert(poly: FloatArray, n: int, normal: FloatArray) -> float:
     return 0.5 * total
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def visible_irradiance(
     x: FloatArray, normal: FloatArray, light: FloatArray, active: IntArray, count: int, first: IntArray,
     corners: FloatArray, stack: FloatArray, marks: IntArray,
@@ -112,7 +113,7 @@ def visible_irradiance(
     return total
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def stack_room(active: IntArray, count: int, first: IntArray) -> int:
     """Return how many parts of a light there may be at a time."""
     room = 4
@@ -121,7 +122,7 @@ def stack_room(active: IntArray, count: int, first: IntArray) -> int:
     return room
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def _side(x: FloatArray, corners: FloatArray, begin: int, end: int) -> float:
     """Return which way round an occluder's corners run, seen from x: 1 or -1; 0 where it is seen edge-on."""
     nx, ny, nz = 0.0, 0.0, 0.0
@@ -141,13 +142,13 @@ def _side(x: FloatArray, corners: FloatArray, begin: int, end: int) -> float:
     return 1.0 if height > 0.0 else -1.0
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def _copy(poly: FloatArray, n: int, out: FloatArray) -> None:
     for k in range(n):
         out[k, 0], out[k, 1], out[k, 2] = poly[k, 0], poly[k, 1], poly[k, 2]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@allocating
 def _cut(poly: FloatArray, n: int, nx: float, ny: float, nz: float, outside: FloatArray) -> tuple[int, int]:
     """Keep in `poly` the part of a polygon with n . v >= 0 and write the other; return their sizes."""
     lowest, highest = np.inf, -np.inf

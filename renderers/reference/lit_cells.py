@@ -14,6 +14,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from aliasbench.renderers.kernel_parts import allocating, called
 from aliasbench.renderers.reference.coverage import band_candidates, row_candidates
 from aliasbench.renderers.reference.fragments import convex_area, copy_corners, split_pixel
 from aliasbench.renderers.reference.irradiance import CORNERS, stack_room
@@ -124,7 +125,7 @@ def lit_rows(
                     doubt[r, s] += error[i, j]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@allocating
 def _integrate(
     fragment: FloatArray, size: int, piece: int, light: int, planes: FloatArray, extent: float, stage: Stage,
     links: Links, rules: Rules, row: int, column: int, left: int, good: FloatArray, poor: FloatArray,
@@ -150,7 +151,7 @@ def _integrate(
     return left
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@allocating
 def _candidates(links: Links, piece: int, light: int, lights: int) -> tuple[IntArray, int]:
     """Return the pairs that may be in a piece's light, with room for more, and their number."""
     at = piece * lights + max(light, 0)
@@ -163,7 +164,7 @@ def _candidates(links: Links, piece: int, light: int, lights: int) -> tuple[IntA
     return out, end - begin
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@allocating
 def _integrate_cells(
     fragment: FloatArray, size: int, piece: int, light: int, planes: FloatArray, tiny: float, stage: Stage,
     links: Links, rules: Rules, row: int, column: int, left: int, good: FloatArray, poor: FloatArray,
@@ -265,7 +266,7 @@ def _integrate_cells(
     return left
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def _watch(
     world: FloatArray, q: FloatArray, n: int, tiny: float, links: Links, lists: IntArray, begin: int, listed: int,
     end: int, values: FloatArray, best: FloatArray,
@@ -311,7 +312,7 @@ def _watch(
     return here, crossing
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@allocating
 def _apply(
     rule: FloatArray, poly: FloatArray, n: int, piece: int, light: int, part: FloatArray, planes: FloatArray,
     stage: Stage, links: Links, rules: Rules, row: int, column: int, active: IntArray, here: int, stack: FloatArray,
@@ -346,22 +347,26 @@ def _apply(
                         out[i, j, c] += w * value[c]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@allocating
 def _more_cells(cells: FloatArray) -> FloatArray:
     out = np.empty((2 * len(cells), cells.shape[1], 2))
-    out[: len(cells)] = cells
+    for k in range(len(cells)):
+        copy_corners(cells[k], cells.shape[1], out[k])
     return out
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@allocating
 def _more_shape(shape: IntArray) -> IntArray:
     out = np.empty((2 * len(shape), 3), np.int64)
-    out[: len(shape)] = shape
+    for k in range(len(shape)):
+        for c in range(3):
+            out[k, c] = shape[k, c]
     return out
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@allocating
 def _longer(ids: IntArray) -> IntArray:
     out = np.empty(2 * len(ids), np.int64)
-    out[: len(ids)] = ids
+    for k in range(len(ids)):
+        out[k] = ids[k]
     return out

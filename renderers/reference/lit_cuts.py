@@ -3,9 +3,9 @@
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from aliasbench.renderers.kernel_parts import allocating, called
 from aliasbench.renderers.reference.runs import BILINEAR, GRID, SINE
 from aliasbench.renderers.reference.shading import Stage
 from aliasbench.scenes.model import FloatArray
@@ -16,7 +16,7 @@ WIDEST = 28  # corners of a cell
 _WAVE = 0.4  # cycles within a cell
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def filter_break(poly: FloatArray, n: int, breaks: FloatArray, row: int, column: int, best: FloatArray) -> bool:
     """Write the distances from a line where a filter is not smooth, if one crosses the cell."""
     for axis in range(2):
@@ -32,7 +32,7 @@ def filter_break(poly: FloatArray, n: int, breaks: FloatArray, row: int, column:
     return False
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@allocating
 def texture_break(stage: Stage, plane: FloatArray, obj: int, poly: FloatArray, n: int, best: FloatArray) -> bool:
     """Write into `best` a line to cut a cell by: a texel's border, or one half-way where a wave has too many cycles."""
     kind, own = stage.kinds[obj], stage.maps[obj]
@@ -79,7 +79,7 @@ def texture_break(stage: Stage, plane: FloatArray, obj: int, poly: FloatArray, n
     return False
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@allocating
 def halve(poly: FloatArray, n: int, best: FloatArray) -> None:
     """Write the distances from a line through the middle, across the longer way."""
     low, high = np.empty(2), np.empty(2)
@@ -92,7 +92,7 @@ def halve(poly: FloatArray, n: int, best: FloatArray) -> None:
         best[k] = poly[k, axis] - (low[axis] + high[axis]) / 2
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def divide(
     poly: FloatArray, n: int, values: FloatArray, begin: int, listed: int, cells: FloatArray, shape: IntArray, top: int
 ) -> int:

@@ -9,6 +9,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from aliasbench.renderers.kernel_parts import allocating, called
 from aliasbench.renderers.reference.coverage import band_candidates, row_candidates
 from aliasbench.renderers.reference.irradiance import CORNERS, stack_room
 from aliasbench.renderers.reference.lit_cells import Rules
@@ -73,7 +74,7 @@ def point_rows(
                             patch[r, c0, c] += w * sum_here[c]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@allocating
 def radiance_at(
     stage: Stage, links: Links, planes: FloatArray, piece: int, x: float, y: float, tiny: float, active: IntArray,
     scratch: FloatArray, marks: IntArray, out: FloatArray,
@@ -113,7 +114,8 @@ def radiance_at(
                 break
             if here == len(active):
                 more = np.empty(2 * here, np.int64)
-                more[:here] = active
+                for k in range(here):
+                    more[k] = active[k]
                 active = more
             active[here] = links.pair_occluder[pair]
             here += 1
@@ -128,7 +130,7 @@ def radiance_at(
     return scratch, marks, active
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def shown_at(
     points: FloatArray, starts: IntArray, planes: FloatArray, owners: IntArray, extent: float, perspective: bool,
     ids: IntArray, n: int, x: float, y: float,

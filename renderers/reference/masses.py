@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
+from aliasbench.renderers.kernel_parts import allocating, called
 from aliasbench.renderers.sampling.filters import CONE, GAUSSIAN, LANCZOS, MITCHELL, FilterSpec, integral_at, profile_at
 from aliasbench.scenes.model import FloatArray
 
@@ -112,7 +113,7 @@ def cell_peaks(spec: FilterSpec) -> FloatArray:
     return np.minimum(sampled + steep / (2 * count), spec.peak)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@allocating
 def run_masses(
     params: FloatArray, limits: FloatArray, nodes: FloatArray, knots: FloatArray, kind: int, support: float,
     run: FloatArray, first: tuple[int, int], shape: tuple[int, int], profile: FloatArray, share: FloatArray,
@@ -189,7 +190,7 @@ def run_masses(
     return used
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@allocating
 def _cuts(knots: FloatArray, x0: float, y0: float, x1: float, y1: float) -> tuple[FloatArray, int]:
     """Return the sorted shares of the way along a run at which it is cut, 0 and 1 included, and the number of parts."""
     cuts = np.empty(2 * len(knots) + 2)
@@ -208,7 +209,7 @@ def _cuts(knots: FloatArray, x0: float, y0: float, x1: float, y1: float) -> tupl
     return cuts, n
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def _measure(dx: float, dy: float, limits: FloatArray, kind: int) -> tuple[float, int]:
     """Return the length of a cut's part in the rules' measure, and into how many parts the cut must be divided."""
     unit, longest = limits[0], limits[len(limits) - 1]
@@ -233,7 +234,7 @@ def _cone_part(radius: float, left: float, x0: float, y0: float, x1: float, y1: 
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def _cone_triangle(px: float, py: float, qx: float, qy: float) -> float:
     """Return the mass of a cone of radius 1 over the signed triangle from its tip to p and q.
 

@@ -7,9 +7,9 @@ What is smooth takes the rules of `tiles`, with as many nodes more as the powers
 """
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from aliasbench.renderers.kernel_parts import allocating, called
 from aliasbench.renderers.reference.fragments import convex_area, copy_corners, cut_convex
 from aliasbench.renderers.reference.tiles import (
     MOST_CHANGE,
@@ -29,7 +29,7 @@ from aliasbench.scenes.model import FloatArray
 IntArray = NDArray[np.int64]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def polygon_moments(
     poly: FloatArray, n: int, place: FloatArray, degree: int, rules: FloatArray, out: FloatArray
 ) -> None:
@@ -57,7 +57,7 @@ def polygon_moments(
                 power *= x
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def add_colored(parts: FloatArray, degree: int, color: FloatArray, out: FloatArray) -> None:
     """Add moments (degree + 1, degree + 1) times a colour to `out` (degree + 1, degree + 1, 3)."""
     for a in range(degree + 1):
@@ -66,7 +66,7 @@ def add_colored(parts: FloatArray, degree: int, color: FloatArray, out: FloatArr
                 out[a, b, c] += parts[a, b] * color[c]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def _add_point(x: float, y: float, place: FloatArray, degree: int, value: FloatArray, out: FloatArray) -> None:
     """Add x^a y^b times a value (3,) to `out`."""
     x, y = (x - place[0]) / place[2], (y - place[1]) / place[2]
@@ -80,7 +80,7 @@ def _add_point(x: float, y: float, place: FloatArray, degree: int, value: FloatA
         power *= x
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@allocating
 def clip_moments(
     poly: FloatArray, n: int, own: FloatArray, bilinear: bool, height: int, width: int, offset: int,
     texels: FloatArray, rules: FloatArray, place: FloatArray, degree: int, out: FloatArray,
@@ -130,7 +130,7 @@ def clip_moments(
         j += 1.0
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@allocating
 def _blend_moments(
     tile: FloatArray, n: int, u: FloatArray, v: FloatArray, q: FloatArray, low: int, high: int, texels: FloatArray,
     rules: FloatArray, place: FloatArray, degree: int, out: FloatArray,
@@ -160,7 +160,7 @@ def _blend_moments(
                 _add_point(x, y, place, degree, value, out)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@allocating
 def zone_moments(
     poly: FloatArray, n: int, own: FloatArray, params: FloatArray, rules: FloatArray, place: FloatArray, degree: int,
     out: FloatArray,

@@ -15,6 +15,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from aliasbench.renderers.kernel_parts import allocating, called
 from aliasbench.scenes.model import FloatArray
 
 IntArray = NDArray[np.int64]
@@ -171,7 +172,7 @@ def link_lights(
     )  # fmt: skip
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@allocating
 def event_planes(
     light: FloatArray, hull: FloatArray, close: float, planes: FloatArray, kinds: IntArray
 ) -> tuple[int, bool]:
@@ -221,7 +222,7 @@ def event_planes(
     return count, dark
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def clip_front(poly: FloatArray, n: int, plane: FloatArray, close: float, out: FloatArray) -> int:
     """Write the part of a convex polygon in front of a plane; return its size, 0 where it only touches the plane."""
     highest = -np.inf
@@ -246,12 +247,12 @@ def clip_front(poly: FloatArray, n: int, plane: FloatArray, close: float, out: F
     return size if size > 2 else 0
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def _height(plane: FloatArray, p: FloatArray) -> float:
     return plane[0] * p[0] + plane[1] * p[1] + plane[2] * p[2] - plane[3]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def _range(plane: FloatArray, poly: FloatArray) -> tuple[float, float]:
     lowest, highest = np.inf, -np.inf
     for k in range(len(poly)):
@@ -260,7 +261,7 @@ def _range(plane: FloatArray, poly: FloatArray) -> tuple[float, float]:
     return lowest, highest
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def _is_before(poly: FloatArray, begin: int, end: int, plane: FloatArray, close: float) -> bool:
     """Return whether any corner is in front of a plane."""
     highest = -np.inf
@@ -269,7 +270,7 @@ def _is_before(poly: FloatArray, begin: int, end: int, plane: FloatArray, close:
     return highest > close
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def _separated(
     planes: FloatArray, kinds: IntArray, first: int, last: int, receivers: FloatArray, begin: int, end: int,
     close: float,
@@ -281,7 +282,7 @@ def _separated(
     return False
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def _boxes_meet(hull: FloatArray, light: FloatArray, piece: FloatArray) -> bool:
     """Return whether the box of an occluder meets that of all segments between a piece and a light."""
     for c in range(3):
@@ -298,7 +299,7 @@ def _boxes_meet(hull: FloatArray, light: FloatArray, piece: FloatArray) -> bool:
     return True
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def _plane_of(a: FloatArray, b: FloatArray, p: FloatArray, close: float, out: FloatArray) -> bool:
     """Write the plane through two points and a third; return False where they are in line."""
     ex, ey, ez = b[0] - a[0], b[1] - a[1], b[2] - a[2]
@@ -312,7 +313,7 @@ def _plane_of(a: FloatArray, b: FloatArray, p: FloatArray, close: float, out: Fl
     return True
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def _plane_through(poly: FloatArray, out: FloatArray) -> bool:
     """Write the plane of a convex polygon (Newell's method); return False for one without area."""
     nx, ny, nz = 0.0, 0.0, 0.0
@@ -330,13 +331,13 @@ def _plane_through(poly: FloatArray, out: FloatArray) -> bool:
     return True
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def _flip(plane: FloatArray) -> None:
     for c in range(4):
         plane[c] = -plane[c]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@allocating
 def _append(store: FloatArray, used: int, rows: FloatArray, n: int) -> FloatArray:
     """Copy n rows to `store` after the first `used` ones; return it, or a longer one."""
     if used + n > len(store):
@@ -351,7 +352,7 @@ def _append(store: FloatArray, used: int, rows: FloatArray, n: int) -> FloatArra
     return store
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@allocating
 def _append_id(store: IntArray, used: int, value: int) -> IntArray:
     """Write one number to `store` after the first `used` ones; return it, or a longer one."""
     if used >= len(store):

@@ -18,6 +18,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from aliasbench.renderers.kernel_parts import allocating, called
 from aliasbench.renderers.reference.cellvalues import Block, Blur, Shades, fill_value
 from aliasbench.renderers.reference.placement import Movers, Room, place_faces
 from aliasbench.renderers.reference.slabs import nearness_at, tie_of
@@ -62,7 +63,7 @@ class Panels(NamedTuple):
     contacts: IntArray
 
 
-@njit(cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+@allocating
 def integrate_cell(
     movers: Movers, contacts: Contacts, begin_at: int, end_at: int, block: Block, shades: Shades, blur: Blur | None,
     extent: float, span: float, shutter: float, target: float, allowed: int, panels: Panels, room: Room,
@@ -167,7 +168,7 @@ def integrate_cell(
     return looks, runs, sides
 
 
-@njit(cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+@called
 def _copy(values: FloatArray, out: FloatArray, size: int) -> None:
     for k in range(size):
         out[k] = values[k]
@@ -186,7 +187,7 @@ def look(
     )  # fmt: skip
 
 
-@njit(cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+@called
 def _judge(panels: Panels, p: int, speed: float, span: float, shutter: float, peak: float, size: int) -> None:
     """Fill the bound of a panel, and its part that no instant may have seen."""
     values, length = panels.values, panels.spans[p, 1]
@@ -198,14 +199,14 @@ def _judge(panels: Panels, p: int, speed: float, span: float, shutter: float, pe
     panels.bounds[p] = length / shutter * worst * _SAFETY + panels.unseen[p] * peak
 
 
-@njit(cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+@called
 def _third(values: FloatArray, k: int) -> float:
     """Return the sum of the absolute third differences of a panel's values."""
     a, b, c, d, e = values[0, k], values[1, k], values[2, k], values[3, k], values[4, k]
     return abs(a - 3.0 * b + 3.0 * c - d) + abs(b - 3.0 * c + 3.0 * d - e)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+@called
 def _sum_up(
     panels: Panels, count: int, block: Block, shades: Shades, shutter: float, unresolved: float, total: FloatArray,
     bound: FloatArray,
@@ -228,7 +229,7 @@ def _sum_up(
         bound[at] += unresolved * min(1.0, peak)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+@allocating
 def _resolve(
     movers: Movers, faces: IntArray, amount: int, begin: float, length: float, block: Block, extent: float, room: Room,
     most: int, spans: FloatArray,
@@ -259,7 +260,7 @@ def _resolve(
     return count, unresolved, looks
 
 
-@njit(cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+@allocating
 def _may_touch(
     movers: Movers, faces: IntArray, amount: int, begin: float, length: float, block: Block, extent: float, room: Room
 ) -> bool:

@@ -15,6 +15,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from aliasbench.renderers.kernel_parts import called
 from aliasbench.renderers.reference.clipping import (
     NEAR_PARALLEL,
     NEAR_PERSPECTIVE,
@@ -237,7 +238,7 @@ def _clip_project(
     return k, m
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def _may_come_in(
     corners: FloatArray, n: int, half: FloatArray, near: float, perspective: bool, scale: float, time: float,
 ) -> float:  # fmt: skip
@@ -282,7 +283,7 @@ def _may_come_in(
     return speed
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def _reverse(points: FloatArray, reach: FloatArray, outlined: BoolArray, n: int) -> None:
     """Turn a loop round; an edge's data move with the edge."""
     for i in range(n // 2):

@@ -11,6 +11,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from aliasbench.renderers.kernel_parts import allocating, called
 from aliasbench.renderers.reference.clipping import (
     NEAR_PARALLEL,
     NEAR_PERSPECTIVE,
@@ -214,13 +215,13 @@ def place_faces(movers: Movers, faces: IntArray, count: int, time: float, room: 
     return m
 
 
-@njit(cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+@called
 def _apply(matrix: FloatArray, p: FloatArray, out: FloatArray) -> None:
     for c in range(3):
         out[c] = p[0] * matrix[c, 0] + p[1] * matrix[c, 1] + p[2] * matrix[c, 2] + matrix[c, 3]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+@called
 def _camera_pose(camera: FloatArray, turns: bool, time: float, pose: FloatArray) -> None:
     """Fill right, up, forward and the position."""
     for c in range(3):
@@ -246,7 +247,7 @@ def _camera_pose(camera: FloatArray, turns: bool, time: float, pose: FloatArray)
         pose[1, c] = up[c]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+@allocating
 def _motion_matrix(kind: int, data: FloatArray, pose: FloatArray, time: float, out: FloatArray) -> None:
     """Fill the (3, 4) matrix that takes a place at rest to camera coordinates."""
     moved = np.empty((3, 4))
@@ -272,7 +273,7 @@ def _motion_matrix(kind: int, data: FloatArray, pose: FloatArray, time: float, o
             out[r, c] = pose[r, 0] * moved[0, c] + pose[r, 1] * moved[1, c] + pose[r, 2] * moved[2, c]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+@called
 def _rotate(data: FloatArray, turns: float, out: FloatArray) -> None:
     """Fill the rotation by `turns` revolutions; whole and quarter turns are exact, as in `scenes.motion`."""
     reduced = turns - np.floor(turns + 0.5)

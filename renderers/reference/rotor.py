@@ -18,6 +18,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from aliasbench.renderers.kernel_parts import allocating, called
 from aliasbench.renderers.reference.turning import Rotor
 from aliasbench.scenes.model import FloatArray
 
@@ -70,7 +71,7 @@ def integrate_row(
                 slack[2, j] = _integrate(edges, jumps, radii, sweep, 2, 0.0, low, high, tolerance, work, cut[j])
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@allocating
 def _integrate(
     edges: FloatArray, jumps: FloatArray, radii: FloatArray, sweep: float, kind: int, distance: float, low: float,
     high: float, tolerance: float, work: FloatArray, out: FloatArray,
@@ -167,7 +168,7 @@ def _integrate(
     return slack
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def _sort(values: FloatArray, n: int) -> None:
     """Sort the first n values in place; there are few, and this compiles faster than the library's."""
     for i in range(1, n):
@@ -179,7 +180,7 @@ def _sort(values: FloatArray, n: int) -> None:
         values[j + 1] = v
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def _add_value(
     edges: FloatArray, jumps: FloatArray, active: IntArray, count: int, base: FloatArray, sweep: float, kind: int,
     distance: float, s: float, weight: float, out: FloatArray,
@@ -220,7 +221,7 @@ def _add_value(
             out[c] += jumps[e, c] * value
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def _b3(x: float) -> float:
     """Return the periodic Bernoulli polynomial B3, x in turns."""
     x -= np.floor(x)

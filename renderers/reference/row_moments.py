@@ -14,9 +14,9 @@ what is left of their sum; such fragments are clipped texel by texel (`moments`)
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from aliasbench.renderers.kernel_parts import allocating, called
 from aliasbench.renderers.reference.surfaces import WALK, WALK_BLEND, Surfaces
 from aliasbench.renderers.reference.walks import (
     BLEND,
@@ -87,7 +87,7 @@ def row_primitives(
     return out, means
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def row_length(poly: FloatArray, n: int, own: FloatArray, along: FloatArray, width: int, unit: float) -> float:
     """Return the longest period of a row over a fragment, over 2 pi units: by which primitives grow at most."""
     slope = abs(own[0, 0] * along[0] + own[0, 1] * along[1])
@@ -97,7 +97,7 @@ def row_length(poly: FloatArray, n: int, own: FloatArray, along: FloatArray, wid
     return width * most / (slope * unit * 2 * np.pi)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@allocating
 def walk_moments(
     poly: FloatArray, n: int, own: FloatArray, along: FloatArray, mode: int, block: IntArray, texels: FloatArray,
     primitives: FloatArray, means: FloatArray, rules: FloatArray, place: FloatArray, degree: int, factor: float,
@@ -176,7 +176,7 @@ def walk_moments(
                 next_v = next_crossing(v0, dv, q0, dq, j + up_j) if j != last_j else np.inf
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def _add_node(
     s: float, t: float, x: float, rate: float, weight: float, flat: bool, at: int, texels: FloatArray,
     primitives: FloatArray, means: FloatArray, degree: int, grown: FloatArray, out: FloatArray,
@@ -208,7 +208,7 @@ def _add_node(
                 total *= s
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@allocating
 def wave_moments(
     poly: FloatArray, n: int, own: FloatArray, along: FloatArray, rules: FloatArray, place: FloatArray, degree: int,
     out: FloatArray,
@@ -280,7 +280,7 @@ def wave_moments(
                         total *= s
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@allocating
 def turn_moments(parts: FloatArray, along: FloatArray, degree: int, color: FloatArray, out: FloatArray) -> None:
     """Add moments (degree + 1, degree + 1, 3) of powers of t and s, times a colour, to those of powers of x and y.
 

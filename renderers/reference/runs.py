@@ -1,9 +1,9 @@
 """One visible span of a line, added to the pixels it crosses: flat, texel by texel, or at stratified points."""
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from aliasbench.renderers.kernel_parts import allocating, called
 from aliasbench.renderers.sampling.hashing import combine, unit
 from aliasbench.scenes.model import FloatArray
 
@@ -14,7 +14,7 @@ _MANY_TEXELS = 24.0  # across one pixel: from here on stratified points along th
 _POINTS = 16
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def add_flat(color: FloatArray, x0: float, x1: float, weight: float, out: FloatArray) -> None:
     for column in range(int(x0), min(int(np.ceil(x1)), out.shape[0])):
         share = weight * (min(x1, column + 1.0) - max(x0, float(column)))
@@ -22,7 +22,7 @@ def add_flat(color: FloatArray, x0: float, x1: float, weight: float, out: FloatA
             out[column, c] += share * color[c]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def along_line(plane: FloatArray, row: FloatArray, y: float) -> tuple[float, float]:
     """Return the slope and the value at x = 0 of (row . (u, v, 1)) q along a line."""
     slope = row[0] * plane[1, 0] + row[1] * plane[2, 0] + row[2] * plane[3, 0]
@@ -34,7 +34,7 @@ def along_line(plane: FloatArray, row: FloatArray, y: float) -> tuple[float, flo
     return slope, start
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@allocating
 def add_texels(
     plane: FloatArray, to_grid: FloatArray, bilinear: bool, size: IntArray, offset: int, texels: FloatArray,
     color: FloatArray, x0: float, x1: float, y: float, weight: float, key: int, out: FloatArray,
@@ -90,7 +90,7 @@ def add_texels(
             out[column, c] += weight * color[c] * value[c]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def _crossing(a: float, b: float, qa: float, qb: float, level: float, moves: bool) -> float:
     """Return the x where (a x + b) / (qa x + qb) reaches a level, inf where it does not move."""
     slope = a - level * qa
@@ -99,19 +99,19 @@ def _crossing(a: float, b: float, qa: float, qb: float, level: float, moves: boo
     return (level * qb - b) / slope
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def _wrap(index: float, period: int) -> int:
     return int(index - np.floor(index / period) * period) % period
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def _next(index: int, forward: float, period: int) -> int:
     if forward > 0.5:
         return index + 1 if index + 1 < period else 0
     return index - 1 if index > 0 else period - 1
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def _look_up(
     u: float, v: float, bilinear: bool, size: IntArray, offset: int, texels: FloatArray, share: float,
     value: FloatArray,
@@ -132,7 +132,7 @@ def _look_up(
         value[c] += share * ((1 - t) * low + t * high)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def add_smooth(
     plane: FloatArray, to_own: FloatArray, kind: int, params: FloatArray, color: FloatArray, x0: float, x1: float,
     y: float, weight: float, key: int, out: FloatArray,

@@ -9,6 +9,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from aliasbench.renderers.kernel_parts import allocating, called
 from aliasbench.renderers.reference.cells import sort_prefix
 from aliasbench.renderers.reference.runs import BILINEAR, add_flat, add_smooth, add_texels, along_line
 from aliasbench.renderers.reference.slabs import TIE
@@ -97,7 +98,7 @@ def scan_rows(
                     )  # fmt: skip
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def _level_lines(
     plane: FloatArray, own: FloatArray, shift: float, row: int, width: int, knots: FloatArray, m: int,
 ) -> tuple[int, int]:  # fmt: skip
@@ -130,7 +131,7 @@ def _level_lines(
     return m, asked
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@allocating
 def _line(
     points: FloatArray, starts: IntArray, planes: FloatArray, owners: IntArray, colors: FloatArray, kinds: IntArray,
     maps: FloatArray, params: FloatArray, sizes: IntArray, offsets: IntArray, texels: FloatArray, perspective: bool,
@@ -189,7 +190,7 @@ def _line(
             )  # fmt: skip
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def _chord(points: FloatArray, begin: int, end: int, y: float) -> tuple[float, float]:
     """Return where a convex piece begins and ends along a line; empty (1, 0) where it does not meet it."""
     lo, hi = np.inf, -np.inf

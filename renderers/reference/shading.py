@@ -7,9 +7,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from aliasbench.renderers.kernel_parts import called
 from aliasbench.renderers.reference.irradiance import visible_irradiance
 from aliasbench.renderers.reference.occluders import Links
 from aliasbench.renderers.reference.runs import BILINEAR, GRID, SINE
@@ -61,7 +61,7 @@ class Stage(NamedTuple):
     brightest: FloatArray
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def place_of(stage: Stage, plane: FloatArray, x: float, y: float, out: FloatArray) -> float:
     """Write the place of a picture point on a piece, relative to the camera; return q (see `pieces`)."""
     a, b = (x - stage.center[0]) / stage.scale, (stage.center[1] - y) / stage.scale
@@ -76,7 +76,7 @@ def place_of(stage: Stage, plane: FloatArray, x: float, y: float, out: FloatArra
     return near if stage.perspective else 1.0
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def coat_at(stage: Stage, planes: FloatArray, piece: int, x: float, y: float, out: FloatArray) -> None:
     """Write colour times texture at a point of the picture."""
     obj = stage.objects[piece]
@@ -112,7 +112,7 @@ def coat_at(stage: Stage, planes: FloatArray, piece: int, x: float, y: float, ou
         out[c] *= (table[c] + table[3 + c]) / 2 + (table[3 + c] - table[c]) / 2 * wave
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def shade(
     stage: Stage, links: Links, planes: FloatArray, piece: int, light: int, part: FloatArray, x: float, y: float,
     active: IntArray, here: int, stack: FloatArray, marks: IntArray, world: FloatArray, value: FloatArray,

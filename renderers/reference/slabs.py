@@ -1,9 +1,9 @@
 """One cell that edges cross, cut into slabs and spans: the heart of exact coverage (see `coverage`)."""
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from aliasbench.renderers.kernel_parts import allocating, called
 from aliasbench.renderers.reference.cells import cross_lines, local_line, sort_prefix
 from aliasbench.scenes.model import FloatArray
 
@@ -12,7 +12,7 @@ IntArray = NDArray[np.int64]
 TIE = 1e-9  # nearer than this (relative) is in the same plane, where the later object wins
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def add_area(total: FloatArray, comp: FloatArray, color: FloatArray, area: float) -> None:
     """Add area times colour, keeping what each sum loses (Neumaier)."""
     for c in range(3):
@@ -25,17 +25,17 @@ def add_area(total: FloatArray, comp: FloatArray, color: FloatArray, area: float
         total[c] = s
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def nearness_at(plane: FloatArray, x: float, y: float) -> float:
     return plane[0] * x + plane[1] * y + plane[2]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def tie_of(perspective: bool, extent: float, a: float, b: float) -> float:
     return TIE * (max(abs(a), abs(b)) if perspective else extent)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@allocating
 def gather_lines(
     points: FloatArray, starts: IntArray, planes: FloatArray, perspective: bool, extent: float, kept: IntArray,
     edges: IntArray, count: int, lines: int, X: float, Y: float, size: float,
@@ -114,7 +114,7 @@ def gather_lines(
     return line, piece, side, band, events, nl, ne
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@allocating
 def cut_slabs(
     points: FloatArray, starts: IntArray, planes: FloatArray, owners: IntArray, colors: FloatArray, perspective: bool,
     extent: float, kept: IntArray, edges: IntArray, count: int, lines: int, X: float, Y: float, size: float,
@@ -164,7 +164,7 @@ def cut_slabs(
         add_area(total, comp, colors[shown], height * (size - begin))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def _planes_meet(
     p: FloatArray, q: FloatArray, perspective: bool, extent: float, X: float, Y: float, size: float,
 ) -> bool:  # fmt: skip
@@ -177,7 +177,7 @@ def _planes_meet(
     return low < -tie and high > tie
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def front_owner(
     planes: FloatArray, owners: IntArray, perspective: bool, extent: float, kept: IntArray, spans: FloatArray,
     count: int, X: float, Y: float, x: float, y: float,

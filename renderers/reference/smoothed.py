@@ -12,6 +12,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from aliasbench.renderers.kernel_parts import allocating, called
 from aliasbench.renderers.reference.coverage import row_extent
 from aliasbench.renderers.reference.expansions import Expansion, expand_filter, gather_row
 from aliasbench.renderers.reference.flat import Integral, over_bands
@@ -194,7 +195,7 @@ def _smooth_rows(
     return lost, longest
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@allocating
 def _add_texture(
     poly: FloatArray, n: int, way: int, own: FloatArray, along: FloatArray, block: IntArray, params: FloatArray,
     shift: float, shifted: IntArray, color: FloatArray, texels: FloatArray, primitives: FloatArray,
@@ -252,7 +253,7 @@ def _add_texture(
     return 0.0, 0.0
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def _add_tinted(parts: FloatArray, color: FloatArray, out: FloatArray) -> None:
     for a in range(parts.shape[0]):
         for b in range(parts.shape[0] - a):

@@ -10,6 +10,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from aliasbench.renderers.kernel_parts import allocating, called
 from aliasbench.scenes.model import FloatArray
 
 IntArray = NDArray[np.int64]
@@ -190,7 +191,7 @@ def cut_face(corners: FloatArray, rectangles: FloatArray, most: int) -> tuple[Fl
     return out[:k], starts[: parts + 1]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@allocating
 def _cut(points: FloatArray, n: int, axis: int, at: float, keep_above: bool, out: FloatArray) -> int:
     """Write a convex polygon's part on one side of a line of texture space; return its size."""
     size = 0
@@ -214,7 +215,7 @@ def _cut(points: FloatArray, n: int, axis: int, at: float, keep_above: bool, out
     return size
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def _area(points: FloatArray, n: int) -> float:
     """Return the area of a planar polygon in space."""
     x, y, z = 0.0, 0.0, 0.0

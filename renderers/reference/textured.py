@@ -11,6 +11,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from aliasbench.renderers.kernel_parts import allocating
 from aliasbench.renderers.reference.coverage import row_extent
 from aliasbench.renderers.reference.faces import Faces
 from aliasbench.renderers.reference.flat import Integral, over_bands, palette, scene_extent
@@ -221,7 +222,7 @@ def texture_rows(
     return lost
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@allocating
 def _add_rows(
     poly: FloatArray, n: int, own: FloatArray, along: FloatArray, mode: int, shift: float, block: IntArray,
     shifted: IntArray, texels: FloatArray, sums: FloatArray, part: FloatArray, value: FloatArray,

@@ -11,6 +11,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from aliasbench.renderers.kernel_parts import allocating, called
 from aliasbench.renderers.reference.fragments import convex_area, copy_corners, cut_convex
 from aliasbench.renderers.reference.walks import cell_of, linear_at, wrap
 from aliasbench.scenes.model import FloatArray, read_only
@@ -79,7 +80,7 @@ def clip_texels(
         j += 1.0
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def texel_range(u: FloatArray, q: FloatArray, poly: FloatArray, n: int) -> tuple[float, float]:
     """Return the first and last whole number below u / q over a polygon."""
     low, high = np.inf, -np.inf
@@ -89,7 +90,7 @@ def texel_range(u: FloatArray, q: FloatArray, poly: FloatArray, n: int) -> tuple
     return np.floor(low), np.floor(high)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@allocating
 def _blend_tile(
     tile: FloatArray, n: int, u: FloatArray, v: FloatArray, q: FloatArray, low: int, high: int, texels: FloatArray,
     rules: FloatArray, value: FloatArray,
@@ -117,7 +118,7 @@ def _blend_tile(
                     value[c] += area * (below + t * (above - below))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@allocating
 def integrate_zone(
     poly: FloatArray, n: int, own: FloatArray, k: float, phase: float, rules: FloatArray,
 ) -> tuple[float, float]:  # fmt: skip
@@ -155,7 +156,7 @@ def integrate_zone(
     return total, lost
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def phase_rates(quad: FloatArray, own: FloatArray, k: float) -> tuple[float, float]:
     """Return the largest gradient of the phase, and how fast it changes, per pixel."""
     fastest, bend = 0.0, 0.0
@@ -170,7 +171,7 @@ def phase_rates(quad: FloatArray, own: FloatArray, k: float) -> tuple[float, flo
     return fastest, bend
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def fan_quads(poly: FloatArray, n: int, stack: FloatArray) -> int:
     """Write a convex polygon as quadrilaterals, the last of them perhaps a triangle."""
     count = 0
@@ -183,7 +184,7 @@ def fan_quads(poly: FloatArray, n: int, stack: FloatArray) -> int:
     return count
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def point_of(quad: FloatArray, g: float, h: float) -> tuple[float, float, float]:
     """Return a point of a quadrilateral and the Jacobian there, of g and h in [-1, 1]."""
     s, t = (1.0 + g) / 2, (1.0 + h) / 2
@@ -198,7 +199,7 @@ def point_of(quad: FloatArray, g: float, h: float) -> tuple[float, float, float]
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@allocating
 def quarter_quad(quad: FloatArray, out: FloatArray) -> None:
     """Write the four parts of a quadrilateral, cut through the middles of its sides."""
     grid = np.empty((3, 3, 2))
@@ -212,7 +213,7 @@ def quarter_quad(quad: FloatArray, out: FloatArray) -> None:
             out[p, 2, c], out[p, 3, c] = grid[a + 1, b + 1, c], grid[a, b + 1, c]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def relative_change(q: FloatArray, quad: FloatArray) -> float:
     """Return by which share of its least value q changes over a quadrilateral."""
     low, high = np.inf, -np.inf
@@ -222,7 +223,7 @@ def relative_change(q: FloatArray, quad: FloatArray) -> float:
     return (high - low) / low if low > 0.0 else np.inf
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@allocating
 def longest_sides(quad: FloatArray) -> tuple[float, float]:
     """Return the length of the longer of the first and third side, and of the second and fourth."""
     lengths = np.empty(4)

@@ -12,6 +12,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from aliasbench.renderers.kernel_parts import allocating, called
 from aliasbench.scenes.model import FloatArray
 
 IntArray = NDArray[np.int64]
@@ -27,12 +28,12 @@ _WAVE_NODES, _WAVE_WEIGHTS = (np.array(v) for v in np.polynomial.legendre.leggau
 MOST_PANELS = 100_000
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def linear_at(row: FloatArray, x: float, y: float) -> float:
     return row[0] * x + row[1] * y + row[2]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def cell_of(own: FloatArray, poly: FloatArray, n: int) -> tuple[float, float]:
     """Return the texel (column, row) under the middle of a fragment; numbers are kept small by counting from it."""
     x, y = 0.0, 0.0
@@ -43,13 +44,13 @@ def cell_of(own: FloatArray, poly: FloatArray, n: int) -> tuple[float, float]:
     return np.floor(linear_at(own[0], x, y) / q), np.floor(linear_at(own[1], x, y) / q)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def wrap(index: float, period: int) -> int:
     """Return a whole number, however large, modulo the period."""
     return int(index - np.floor(index / period) * period) % period
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def next_crossing(start: float, change: float, q0: float, dq: float, level: float) -> float:
     """Return the share of an edge at which (start + s change) / (q0 + s dq) is at a level."""
     slope = change - level * dq
@@ -128,7 +129,7 @@ def walk_texels(
                 next_v = next_crossing(v0, dv, q0, dq, j + up_j) if j != last_j else np.inf
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def _add_blend(
     at: float, to: float, u0: float, du: float, v0: float, dv: float, q0: float, dq: float, weight: float,
     periods: float, low: int, i_low: int, high: int, width: int, texels: FloatArray, sums: FloatArray,
@@ -152,7 +153,7 @@ def _add_blend(
                 value[c] += share * (below + y * (above - below))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@allocating
 def walk_wave(poly: FloatArray, n: int, own: FloatArray, tx: float, ty: float) -> float:
     """Return the integral of cos(2 pi u) over a fragment; q does not change along (tx, ty).
 

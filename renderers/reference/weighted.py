@@ -13,6 +13,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from aliasbench.renderers.kernel_parts import called
 from aliasbench.renderers.reference.coverage import row_extent
 from aliasbench.renderers.reference.flat import over_bands
 from aliasbench.renderers.reference.masses import cell_masses
@@ -163,7 +164,7 @@ def sample_rows(
                 out[row, column, 2 + c] = colors[owner, c] * value[c] - means[row, column, c]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def _is_inside(points: FloatArray, begin: int, end: int, x: float, y: float) -> bool:
     for k in range(begin, end):
         j = k + 1 if k + 1 < end else begin
@@ -173,7 +174,7 @@ def _is_inside(points: FloatArray, begin: int, end: int, x: float, y: float) -> 
     return True
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@called
 def _look_up(
     way: int, own: FloatArray, block: IntArray, params: FloatArray, texels: FloatArray, x: float, y: float,
     value: FloatArray,

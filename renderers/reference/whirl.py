@@ -15,6 +15,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from aliasbench.renderers.kernel_parts import allocating, called
 from aliasbench.renderers.reference.flat import Integral, over_bands
 from aliasbench.renderers.reference.turning import Rotor
 from aliasbench.renderers.reference.whirl_cuts import MOST_MET, draw_towards, find_knots, find_strips, is_tangled
@@ -188,7 +189,7 @@ def _whirl_rows(
                             slack[at, to] += off[p, q]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+@called
 def _radii(box: FloatArray) -> tuple[float, float]:
     """Return the least and greatest distance of a rectangle from the hub."""
     x0, x1, y0, y1 = box
@@ -198,7 +199,7 @@ def _radii(box: FloatArray) -> tuple[float, float]:
     return np.sqrt(x * x + y * y), np.sqrt(far_x * far_x + far_y * far_y)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+@called
 def _spread(sums: FloatArray, p: int, q: int, c: int, rules: int) -> float:
     """Return a bound from what the rules say of one pixel."""
     a, b = sums[0, p, q, c], sums[1, p, q, c]
@@ -208,7 +209,7 @@ def _spread(sums: FloatArray, p: int, q: int, c: int, rules: int) -> float:
     return 2.0 * _SAFETY * max(abs(a - b), abs(a - d), abs(b - d))
 
 
-@njit(cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+@allocating
 def _integrate_part(
     edges: FloatArray, jumps: FloatArray, active: IntArray, count: int, base: FloatArray, sweep: float,
     kinks: FloatArray, near: IntArray, met: int, rings: FloatArray, ringed: int, hub: FloatArray, row: int, column: int,
@@ -275,7 +276,7 @@ def _integrate_part(
                 off[p, q] += worst
 
 
-@njit(cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+@called
 def _pattern(
     edges: FloatArray, jumps: FloatArray, active: IntArray, count: int, base: FloatArray, sweep: float, x: float,
     y: float, out: FloatArray,
@@ -308,7 +309,7 @@ def _pattern(
             out[c] += jumps[e, c] * value
 
 
-@njit(cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+@called
 def _b2(x: float) -> float:
     """Return the periodic Bernoulli polynomial B2 less 1/6, x in turns."""
     x -= np.floor(x)

@@ -4,9 +4,9 @@ A rectangle is cut across into strips, and a line through it into pieces, that h
 """
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from aliasbench.renderers.kernel_parts import called
 from aliasbench.scenes.model import FloatArray
 
 IntArray = NDArray[np.int64]
@@ -14,7 +14,7 @@ IntArray = NDArray[np.int64]
 MOST_MET = 12  # curves in a cell of which it is known beforehand where they meet each other
 
 
-@njit(cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+@called
 def is_tangled(
     kinks: FloatArray, near: IntArray, met: int, rings: FloatArray, ringed: int,
     box: tuple[float, float, float, float],
@@ -38,7 +38,7 @@ def is_tangled(
     return count > 0 or (x == 0.0 and y == 0.0)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+@called
 def find_strips(
     kinks: FloatArray, near: IntArray, met: int, rings: FloatArray, ringed: int, swap: bool, u0: float, u1: float,
     v0: float, v1: float, out: FloatArray,
@@ -90,7 +90,7 @@ def find_strips(
     return _insert(out, n, v1)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+@called
 def find_knots(
     kinks: FloatArray, near: IntArray, met: int, rings: FloatArray, ringed: int, swap: bool, u0: float, u1: float,
     v: float, out: FloatArray, round_: NDArray[np.bool_],
@@ -116,7 +116,7 @@ def find_knots(
     return _insert_marked(out, n, u1, round_, False)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+@called
 def draw_towards(x: float, first: bool, last: bool) -> tuple[float, float]:
     """Return a place in [-1, 1] drawn towards one end or both, and its weight."""
     t = (1.0 + x) / 2
@@ -129,7 +129,7 @@ def draw_towards(x: float, first: bool, last: bool) -> tuple[float, float]:
     return x, 1.0
 
 
-@njit(cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+@called
 def _insert(values: FloatArray, n: int, value: float) -> int:
     i = n
     while i > 0 and values[i - 1] > value:
@@ -139,7 +139,7 @@ def _insert(values: FloatArray, n: int, value: float) -> int:
     return n + 1
 
 
-@njit(cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+@called
 def _insert_marked(values: FloatArray, n: int, value: float, marks: NDArray[np.bool_], mark: bool) -> int:
     i = n
     while i > 0 and values[i - 1] > value:
