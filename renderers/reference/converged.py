@@ -22,7 +22,7 @@ from aliasbench.renderers.reference.cache import Stored
 from aliasbench.renderers.reference.dotted import affordable_instants, draw_dotted, lattice
 from aliasbench.renderers.reference.faces import Faces
 from aliasbench.renderers.reference.filtered import is_pixel_box, wide_view
-from aliasbench.renderers.reference.flat import over_bands, palette, scene_extent
+from aliasbench.renderers.reference.flat import depth_extent, over_bands, palette
 from aliasbench.renderers.reference.pans import average_slide, is_even_motion
 from aliasbench.renderers.reference.paths import Paths
 from aliasbench.renderers.reference.pieces import join_pieces, pieces_at
@@ -236,7 +236,7 @@ def _replicate(
     fractions = [shutter * (k + unit(key, k)) / times for k in range(times)] if times > 1 else [shutter / 2]
     views = [view_at(scene.camera, scene.animation, frame, f, size) for f in fractions]
     pieces = join_pieces([pieces_at(faces, paths, v, frame, f) for v, f in zip(views, fractions, strict=True)])
-    colors, extent = palette(scene), scene_extent(scene)
+    colors, extent = palette(scene), depth_extent(scene)
     out = np.zeros((size[1], size[0], 3))
 
     def draw(rows: NDArray[np.int64]) -> None:

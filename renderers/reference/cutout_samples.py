@@ -18,7 +18,7 @@ from aliasbench.renderers.reference.cache import Stored
 from aliasbench.renderers.reference.cutout_points import find_uneven, sample_rows
 from aliasbench.renderers.reference.cutouts import fill_holes
 from aliasbench.renderers.reference.filtered import wide_view
-from aliasbench.renderers.reference.flat import over_bands, palette, scene_extent
+from aliasbench.renderers.reference.flat import depth_extent, over_bands, palette
 from aliasbench.renderers.reference.pieces import pieces_at
 from aliasbench.renderers.reference.snapshots import Shot
 from aliasbench.renderers.reference.texture_tables import TextureTable, texture_table
@@ -117,7 +117,7 @@ def sample_place(shot: Shot, table: CutoutTable, place: FloatArray, points: int,
     """
     view = wide_view(shot.view(place), shot.spec)
     pieces = pieces_at(shot.faces, shot.paths, view, shot.frame, float(place[2]))
-    colors, extent = palette(shot.scene), scene_extent(shot.scene)
+    colors, extent = palette(shot.scene), depth_extent(shot.scene)
     textures, spec = table.textures, shot.spec
     edges = _quantiles(spec)
     uneven = np.zeros(out.shape[:2], np.bool_)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from aliasbench.renderers.reference.discs import disc_masses, spread_of
 from aliasbench.renderers.reference.faces import Faces
-from aliasbench.renderers.reference.flat import ROUNDING, Integral, over_bands, palette, scene_extent
+from aliasbench.renderers.reference.flat import ROUNDING, Integral, depth_extent, over_bands, palette, scene_extent
 from aliasbench.renderers.reference.paths import Paths
 from aliasbench.renderers.reference.slabs import TIE
 from aliasbench.renderers.sampling.filters import FilterSpec
@@ -99,7 +99,7 @@ def draw_layers(
     view = view_at(scene.camera, scene.animation, frame, fraction, size)
     found = _layers(scene, faces, paths, view, frame, fraction)
     colors = palette(scene)
-    layers = None if found is None else _visible(found, view, spec, TIE * scene_extent(scene))
+    layers = None if found is None else _visible(found, view, spec, TIE * depth_extent(scene))
     beneath = None if layers is None else _beneath(layers)
     if layers is None or beneath is None:
         return None

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from aliasbench.renderers.reference.borders import BASE, COUNT, trace_pixel
 from aliasbench.renderers.reference.coverage import band_candidates, row_candidates
 from aliasbench.renderers.reference.faces import Faces
-from aliasbench.renderers.reference.flat import Integral, draw_view, over_bands, palette, scene_extent
+from aliasbench.renderers.reference.flat import Integral, depth_extent, draw_view, over_bands, palette
 from aliasbench.renderers.reference.masses import QUADRATURE, cell_masses, cell_peaks, rules_of, run_masses
 from aliasbench.renderers.reference.paths import Paths
 from aliasbench.renderers.reference.pieces import Pieces, pieces_at
@@ -112,7 +112,7 @@ def add_filtered(
     margin = spec.margin
     colors, shades = np.unique(palette(scene), axis=0, return_inverse=True)
     shades = shades.ravel().astype(np.int64)
-    extent = scene_extent(scene)
+    extent = depth_extent(scene)
     rules = rules_of(spec)
     base = np.zeros((view.height, view.width, 3))
     height, width = out.shape[:2]

@@ -13,6 +13,7 @@ from aliasbench.renderers.reference.coverage import cover_rows
 from aliasbench.renderers.reference.faces import Faces
 from aliasbench.renderers.reference.paths import Paths
 from aliasbench.renderers.reference.pieces import Pieces, pieces_at
+from aliasbench.renderers.reference.slabs import TIE
 from aliasbench.scenes.model import FloatArray, Scene
 from aliasbench.scenes.projection import View, view_at
 
@@ -48,8 +49,19 @@ def palette(scene: Scene) -> FloatArray:
     return np.array([*(o.color for o in scene.objects), scene.background], dtype=np.float64).reshape(-1, 3)
 
 
+def depth_extent(scene: Scene) -> float:
+    """Return how far things are from the camera, for what counts as one depth under parallel rays.
+
+    At least a share of how far they are from the origin: coordinates of one plane differ by a few roundings, and a
+    billionth (`slabs.TIE`) of what is returned is at least 16 ulp of them.
+    """
+    eye = np.asarray(scene.camera.position)
+    away = [np.abs(o.vertices - eye).max() for o in scene.objects if len(o.vertices)]
+    return float(max([*away, 16.0 * 2.0**-52 / TIE * scene_extent(scene)]))
+
+
 def scene_extent(scene: Scene) -> float:
-    """Return the size of the scene with its camera, for what counts as one depth."""
+    """Return how far from the origin anything of the scene is, its camera included: what coordinates are rounded to."""
     points = [np.abs(o.vertices).max() for o in scene.objects if len(o.vertices)]
     return float(max([*points, np.abs(scene.camera.position).max(), 1e-300]))
 
@@ -72,7 +84,7 @@ def draw_view(scene: Scene, view: View, pieces: Pieces) -> Integral:
 
 
 def _cover(scene: Scene, view: View, pieces: Pieces, weights: FloatArray, out: FloatArray) -> int:
-    colors, extent = palette(scene), scene_extent(scene)
+    colors, extent = palette(scene), depth_extent(scene)
 
     def draw(rows: NDArray[np.int64]) -> int:
         return cover_rows(

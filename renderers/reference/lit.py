@@ -17,7 +17,7 @@ from scipy.special import roots_jacobi, roots_legendre
 from aliasbench.renderers.reference.coverage import cover_rows
 from aliasbench.renderers.reference.faces import Faces, build_faces
 from aliasbench.renderers.reference.filtered import add_filtered, is_pixel_box, wide_view
-from aliasbench.renderers.reference.flat import Integral, over_bands, palette, scene_extent
+from aliasbench.renderers.reference.flat import Integral, depth_extent, over_bands, palette, scene_extent
 from aliasbench.renderers.reference.lit_cells import Rules, lit_rows
 from aliasbench.renderers.reference.lit_points import point_rows
 from aliasbench.renderers.reference.occluders import Links, link_lights
@@ -35,6 +35,7 @@ TARGET = 2e-6  # a pixel of few cells errs by less
 CELLS = 4e6  # of a picture, some 20 to 50 microseconds each
 _FEWEST_CELLS = 30.0  # to a pixel
 _CLOSE = 1e-9  # as `slabs.TIE`
+_TINY = 1e-12  # of how far from the origin things are: as near to a plane as its points are known to lie in it
 _ROUNDING = 1e-11
 
 
@@ -117,14 +118,14 @@ def integrate(lighting: Lighting, spec: FilterSpec, target: float = TARGET) -> I
     if not (stage.modes != SHOWN).any():
         return Integral(pixels, bound)
     rules = cubature(spec, target, height * width)
-    extent = scene_extent(lighting.scene)
+    extent, tiny = depth_extent(lighting.scene), _TINY * scene_extent(lighting.scene)
 
     def draw(rows: NDArray[np.int64]) -> tuple[int, FloatArray, FloatArray]:
         top, bottom = max(0, int(rows[0]) - 2 * margin), min(height, int(rows[1]))
         patch, doubt = np.zeros((max(0, bottom - top), width, 3)), np.zeros((max(0, bottom - top), width))
         lit_rows(
-            pieces.points, pieces.starts, pieces.planes, pieces.owners, extent, stage, lighting.links, rules, rows, top,
-            patch, doubt,
+            pieces.points, pieces.starts, pieces.planes, pieces.owners, extent, tiny, stage, lighting.links, rules,
+            rows, top, patch, doubt,
         )  # fmt: skip
         return top, patch, doubt
 
@@ -143,15 +144,15 @@ def sample(lighting: Lighting, spec: FilterSpec, points: int, seed: int, frame: 
         return out
     margin = spec.margin if not is_pixel_box(spec) else 0
     rules = cubature(spec, TARGET, 1)
-    extent = scene_extent(lighting.scene)
+    extent, tiny = depth_extent(lighting.scene), _TINY * scene_extent(lighting.scene)
     height = len(out)
 
     def draw(rows: NDArray[np.int64]) -> tuple[int, FloatArray]:
         top, bottom = max(0, int(rows[0]) - 2 * margin), min(height, int(rows[1]))
         patch = np.zeros((max(0, bottom - top), out.shape[1], 3))
         point_rows(
-            pieces.points, pieces.starts, pieces.planes, pieces.owners, extent, stage, lighting.links, rules, points,
-            seed, frame, rows, top, patch,
+            pieces.points, pieces.starts, pieces.planes, pieces.owners, extent, tiny, stage, lighting.links, rules,
+            points, seed, frame, rows, top, patch,
         )  # fmt: skip
         return top, patch
 
@@ -183,7 +184,7 @@ def light_scene(
     links = link_lights(
         world, lit_faces.corners, lit_faces.starts, quads, light_planes, _receivers(pieces, view),
         _piece_planes(stage.normals, lit_faces, world, pieces.owners), pieces.starts, modes == LIT,
-        _CLOSE * scene_extent(scene),
+        _CLOSE * depth_extent(scene),
     )  # fmt: skip
     return Lighting(lit_scene, lit_faces, lit_paths, view, pieces, stage, links, base, bound)
 
@@ -289,7 +290,7 @@ def _draw_base(
     out = np.zeros((view.height - 2 * spec.margin, view.width - 2 * spec.margin, 3))
     if not box:
         return out, add_filtered(plain, view, pieces, np.ones(1), spec, out), coated
-    colors, extent = palette(plain), scene_extent(plain)
+    colors, extent = palette(plain), depth_extent(plain)
 
     def draw(rows: NDArray[np.int64]) -> int:
         return cover_rows(

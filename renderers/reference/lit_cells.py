@@ -63,11 +63,12 @@ class Rules(NamedTuple):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def lit_rows(
-    points: FloatArray, starts: IntArray, planes: FloatArray, owners: IntArray, extent: float, stage: Stage,
-    links: Links, rules: Rules, rows: IntArray, top: int, patch: FloatArray, doubt: FloatArray,
+    points: FloatArray, starts: IntArray, planes: FloatArray, owners: IntArray, extent: float, tiny: float,
+    stage: Stage, links: Links, rules: Rules, rows: IntArray, top: int, patch: FloatArray, doubt: FloatArray,
 ) -> None:  # fmt: skip
     """Add what pixels of rows [rows[0], rows[1]) of the wide picture show of pieces that need light or texture.
 
+    `extent` is the scene's size, for ties of depth; what is nearer to a plane than `tiny` is in it.
     `patch` (h, w, 3) and `doubt` (h, w), a bound on its error, hold rows of the narrow picture from row `top` on.
     """
     m = rules.margin
@@ -108,7 +109,7 @@ def lit_rows(
                 for light in range(-1 if coated else 0, 0 if coated else lights):
                     if coated or links.parts[shown[f], light] >= 0:
                         left = _integrate(
-                            polys[f], sizes[f], shown[f], light, planes, extent, stage, links, rules, row, column,
+                            polys[f], sizes[f], shown[f], light, planes, tiny, stage, links, rules, row, column,
                             left, good, poor, total, error,
                         )  # fmt: skip
             pool += max(left, 0)
@@ -127,12 +128,11 @@ def lit_rows(
 
 @allocating
 def _integrate(
-    fragment: FloatArray, size: int, piece: int, light: int, planes: FloatArray, extent: float, stage: Stage,
+    fragment: FloatArray, size: int, piece: int, light: int, planes: FloatArray, tiny: float, stage: Stage,
     links: Links, rules: Rules, row: int, column: int, left: int, good: FloatArray, poor: FloatArray,
     total: FloatArray, error: FloatArray,
 ) -> int:  # fmt: skip
     """Add the integral over a fragment for one light (-1: of the bare texture); return how many cells are left."""
-    tiny = 1e-12 * extent
     cells = np.empty((32, WIDEST, 2))
     shape = np.empty((32, 3), np.int64)  # corners, and which part of `lists` holds what may be in the way
     lists, count = _candidates(links, piece, light, len(stage.light_planes))

@@ -27,8 +27,9 @@ _GOLDEN = 0.6180339887498949
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def point_rows(
-    points: FloatArray, starts: IntArray, planes: FloatArray, owners: IntArray, extent: float, stage: Stage,
-    links: Links, rules: Rules, number: int, seed: int, frame: int, rows: IntArray, top: int, patch: FloatArray,
+    points: FloatArray, starts: IntArray, planes: FloatArray, owners: IntArray, extent: float, tiny: float,
+    stage: Stage, links: Links, rules: Rules, number: int, seed: int, frame: int, rows: IntArray, top: int,
+    patch: FloatArray,
 ) -> None:  # fmt: skip
     """Add to `patch` (rows of the narrow picture from `top` on) an estimate of what `lit_cells.lit_rows` integrates."""
     m = rules.margin
@@ -57,7 +58,7 @@ def point_rows(
                     continue
                 sum_here[:] = 0.0
                 scratch, marks, active = radiance_at(
-                    stage, links, planes, piece, x, y, 1e-12 * extent, active, scratch, marks, sum_here
+                    stage, links, planes, piece, x, y, tiny, active, scratch, marks, sum_here
                 )
                 for i in range(reach):
                     r = row - 2 * m + i - top

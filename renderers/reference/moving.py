@@ -22,9 +22,9 @@ from aliasbench.renderers.reference.filtered import draw_filtered, is_pixel_box,
 from aliasbench.renderers.reference.flat import (
     ROUNDING,
     Integral,
+    depth_extent,
     over_bands,
     palette,
-    scene_extent,
 )  # fmt: skip
 from aliasbench.renderers.reference.masses import QUADRATURE
 from aliasbench.renderers.reference.paths import Paths
@@ -220,7 +220,7 @@ def _join(
         pieces.outlined, pieces.starts, pieces.planes, pieces.owners, pieces.faces, pieces.instants, pieces.loose,
         pieces.loose_speeds, np.cumsum([0] + [len(s.pieces.loose) for s in parts]).astype(np.int64),
         np.empty(len(pieces.points)), np.empty(size), np.empty(size), np.empty(size), np.empty(size), turns, kinds,
-        contrasts, camera, view.perspective, scene_extent(scene),
+        contrasts, camera, view.perspective, depth_extent(scene),
     )  # fmt: skip
     describe_pieces(slices)
     measure_across(slices, movers)

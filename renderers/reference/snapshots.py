@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from aliasbench.renderers.reference.coverage import cover_rows
 from aliasbench.renderers.reference.faces import Faces
 from aliasbench.renderers.reference.filtered import add_filtered, is_pixel_box, wide_view
-from aliasbench.renderers.reference.flat import over_bands, palette, scene_extent
+from aliasbench.renderers.reference.flat import depth_extent, over_bands, palette
 from aliasbench.renderers.reference.lit import sample_lit
 from aliasbench.renderers.reference.paths import Paths
 from aliasbench.renderers.reference.pieces import join_pieces, pieces_at
@@ -99,7 +99,7 @@ class FlatPictures:
                 for view, place in zip(views, places, strict=True)
             ]
         )
-        colors, extent, weights = palette(scene), scene_extent(scene), np.ones(len(places))
+        colors, extent, weights = palette(scene), depth_extent(scene), np.ones(len(places))
         view = views[0]
 
         def draw(rows: NDArray[np.int64], out: FloatArray) -> int:

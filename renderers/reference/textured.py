@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from aliasbench.renderers.kernel_parts import allocating
 from aliasbench.renderers.reference.coverage import row_extent
 from aliasbench.renderers.reference.faces import Faces
-from aliasbench.renderers.reference.flat import Integral, over_bands, palette, scene_extent
+from aliasbench.renderers.reference.flat import Integral, depth_extent, over_bands, palette
 from aliasbench.renderers.reference.footprints import DEGREE, add_footprint, add_mean, crossings, row_bounds
 from aliasbench.renderers.reference.fragments import between, convex_area, split_pixel
 from aliasbench.renderers.reference.paths import Paths
@@ -67,7 +67,7 @@ def instant_of(
     world = paths.positions(faces.vertices, faces.ranges, frame, fraction) - view.origin
     far = float(np.sqrt((world**2).sum(axis=1)).max(initial=0.0))
     return Instant(
-        view, pieces, build_surfaces(pieces, table, colors, uv_reach, view, far), colors, scene_extent(scene)
+        view, pieces, build_surfaces(pieces, table, colors, uv_reach, view, far), colors, depth_extent(scene)
     )
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aliasbench.renderers.reference.faces import Faces
-from aliasbench.renderers.reference.flat import scene_extent
+from aliasbench.renderers.reference.flat import depth_extent
 from aliasbench.renderers.reference.paths import Paths
 from aliasbench.renderers.reference.slabs import TIE
 from aliasbench.scenes.model import FloatArray, Scene
@@ -111,7 +111,7 @@ def find_rotor(
     backdrop = _backdrop([(p - middle, low, high, owner) for p, low, high, owner in still], rim, furthest)
     if backdrop is None:
         return None
-    tie = TIE * (furthest if view.perspective else scene_extent(scene))
+    tie = TIE * (furthest if view.perspective else depth_extent(scene))
     return _build(_visible(parts, colors, tie), colors[backdrop], float(sweep), hubs[0])
 
 

@@ -10,7 +10,17 @@ from aliasbench.renderers.reference import reference
 from aliasbench.renderers.reference.constant_uv import paint_constant
 from aliasbench.scenes.errors import UnsupportedScene
 from aliasbench.scenes.files import load_scene
-from aliasbench.scenes.model import Camera, Checker, Grating, ImageTexture, Motion, Scene, read_only
+from aliasbench.scenes.model import (
+    Animation,
+    Camera,
+    Checker,
+    Grating,
+    ImageTexture,
+    Motion,
+    Scene,
+    as_vec3,
+    read_only,
+)  # fmt: skip
 from aliasbench.scenes.shapes import mesh, polygon
 
 FLAT = Camera("orthographic", height=2.0)
@@ -213,3 +223,21 @@ def test_a_textured_face_seen_edge_on_but_for_rounding_leaves_the_bound_small():
     assert shown.uncertainty_kind == "bound"
     assert shown.uncertainty < 1e-7
     np.testing.assert_allclose(shown.pixels, np.broadcast_to((0.2, 0.4, 0.6), (8, 8, 3)), atol=1e-10)
+
+
+@pytest.mark.parametrize("text", ["reference:", "reference:filter=tent", "reference:filter=cone"])
+@pytest.mark.parametrize(("unit", "away"), [(1.0, 0.0), (1e-5, 900.0), (1e-6, 1e6), (1e6, 1e6)])
+@pytest.mark.parametrize("moving", [False, True])
+def test_a_surface_a_hundredth_nearer_is_in_front_however_far_from_the_origin(text, unit, away, moving):
+    """What counts as one depth is a billionth of the scene's own size, and not of its distance from the origin."""
+    at = np.array([0.3, -0.2, 1.0]) * away
+    corners = np.array([(-1.0, -1.0, 0.0), (1.0, -1.0, 0.0), (1.0, 1.0, 0.0), (-1.0, 1.0, 0.0)])
+    camera = Camera("orthographic", as_vec3(np.add(at, (0.0, 0.0, 4.0 * unit))), as_vec3(at), height=2.0 * unit)
+    motion = Motion(velocity=(0.1 * unit, 0.0, 0.0)) if moving else Motion()
+    near = polygon(at + unit * (0.6 * corners + (0.0, 0.0, 0.01)), color=(1.0, 0.0, 0.0), motion=motion)
+    far = polygon(at + unit * corners, color=(0.0, 1.0, 0.0))
+    animation = Animation(24.0, 4, 0.5)
+    for order in ((near, far), (far, near)):
+        scene = Scene("layers", camera, order, animation=animation)
+        pixels = render(scene, text, size=(8, 8)).pixels[3:5, 3:5]
+        np.testing.assert_allclose(pixels, np.broadcast_to((1.0, 0.0, 0.0), (2, 2, 3)), rtol=0, atol=1e-9)
