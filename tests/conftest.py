@@ -10,10 +10,13 @@ several processes the long files come first, so that none is begun when all else
 import gc
 import os
 import shutil
+import sys
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
+
+sys.path.append(str(Path(__file__).parent))  # for modules beside the tests: `random_pictures`, `picture_bounds`
 
 settings.register_profile("steady", derandomize=True, deadline=None)
 settings.register_profile("explore", deadline=None, max_examples=1000)
@@ -22,6 +25,13 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "steady"))
 _MEMORY, _ROOM = Path("/dev/shm"), 2**31  # bytes that must be free; all tests together write some 200 MB
 
 _LONG = [
+    "bench/hard/test_shapes.py",
+    "bench/hard/test_edges.py",
+    "bench/hard/test_values.py",
+    "bench/hard/test_scale.py",
+    "bench/hard/test_sizes.py",
+    "test_random_pictures.py",
+    "test_artifacts.py",
     "test_catalog_agreement.py",
     "test_main_job.py",
     "renderers/raster/test_filters.py",
