@@ -37,7 +37,7 @@ from aliasbench.scenes.errors import UnsupportedScene
 from aliasbench.scenes.model import Checker, ImageTexture, Scene, ZonePlate, content_digest
 from aliasbench.scenes.projection import view_at
 
-ALGORITHM = 9  # changes with anything that changes a reference's pixels: stored ones are not used then
+ALGORITHM = 10  # changes with anything that changes a reference's pixels: stored ones are not used then
 _WIDE = 1e-3  # a bound beyond which sampling may do better
 
 

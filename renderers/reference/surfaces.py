@@ -25,6 +25,8 @@ _FACING = 1e-11  # relative change of 1 / depth over a piece that is none
 _ALIGNED = 1e-9  # texels by which a row may leave its direction, across the picture
 _STEEPEST = 1e3  # how much faster u may change across the rows than along them
 _SLIVER = 1e-12  # square pixels of a piece: seen edge-on but for rounding, which is all its texture is too
+# Integrals of running sums along four sides: interpolation, product, quotient and sum round by half of `_EPS` each.
+_SUM_ROUNDINGS = 8.0
 _MOST_LOST = 1e-9  # of a pixel, by dividing rounding errors by how fast u changes along a row
 
 
@@ -121,7 +123,7 @@ def build_surfaces(
         leaves = _settle(rows, homogeneous, relative * reach, squares=kind == GRID)
         off = float((relative * reach).sum()) + leaves
         values = table.params[owner, :6].reshape(2, 3)
-        lost = 0.0
+        lost = summing = 0.0
         if kind in (GRID, BILINEAR):
             if kind == GRID:
                 off = _moved_borders(rows, homogeneous, relative * reach) + leaves
@@ -130,6 +132,8 @@ def build_surfaces(
             h, w, first = out.blocks[index] = table.blocks[owner, int(choice.swapped)]
             values = table.row_texels[first : first + h * (w + 1)]
             off, lost = (1.0 + choice.steep) * off + choice.leaves, choice.lost
+            summed = float(np.abs(table.row_sums[first : first + h * (w + 1)]).max(initial=0.0))
+            summing = _SUM_ROUNDINGS * _EPS * summed * choice.texel_px
             if choice.way in (CLIP, CLIP_BLEND):
                 tiles += _count_tiles(rows, homogeneous)
         elif kind == SINE:
@@ -141,7 +145,7 @@ def build_surfaces(
         out.own[index], out.params[index] = rows, table.params[owner]
         # nothing is off by more than all there is of a piece in a pixel
         off = min(off, area, 1.0) + lost
-        bound = max(bound, scale * float(np.ptp(values, axis=0).max()) * off)
+        bound = max(bound, scale * (float(np.ptp(values, axis=0).max()) * off + summing))
     return replace(out, texels=table.row_texels, sums=table.row_sums, bound=bound, tiles=tiles)
 
 
@@ -149,7 +153,8 @@ def build_surfaces(
 class _Choice:
     """Rows of a texture in the picture.
 
-    `steep`, `leaves` and `lost` enter the bound, see `_STEEPEST`, `_ALIGNED` and `_MOST_LOST`.
+    `steep`, `leaves` and `lost` enter the bound, see `_STEEPEST`, `_ALIGNED` and `_MOST_LOST`; `texel_px` is the
+    longest a texel is along its row, where running sums are divided by what they change by in a pixel.
     """
 
     way: int
@@ -159,6 +164,7 @@ class _Choice:
     steep: float
     leaves: float
     lost: float = 0.0
+    texel_px: float = 0.0
 
 
 def _choose_rows(rows: FloatArray, points: FloatArray, q: FloatArray, blend: bool) -> _Choice:
@@ -179,7 +185,8 @@ def _choose_rows(rows: FloatArray, points: FloatArray, q: FloatArray, blend: boo
         size = float((np.abs(homogeneous) @ np.abs(own[0])).max())
         if leaves <= _ALIGNED and slope * _STEEPEST > fastest and 4.0 * _EPS * size <= _MOST_LOST * slope:
             lost = 4.0 * _EPS * size / slope
-            return _Choice(WALK_BLEND if blend else WALK, own, along, swapped, fastest / slope, leaves, lost)
+            way, texel_px = WALK_BLEND if blend else WALK, float(q.max()) / slope
+            return _Choice(way, own, along, swapped, fastest / slope, leaves, lost, texel_px)
         if swapped is False and slope <= 1e-12 * fastest and not own[1].any():
             # a wave whose crests run along the horizon: its rows are the crests, and what counts texels along them is
             # of no matter, there is only one

@@ -13,8 +13,9 @@ from scipy.special import fresnel
 from aliasbench.renderers.catalog import render
 from aliasbench.renderers.reference.tiles import clip_texels, gauss_table
 from aliasbench.renderers.reference.walks import BLEND, TEXELS, walk_texels
+from aliasbench.scenes import shapes
 from aliasbench.scenes.catalog import SCENES
-from aliasbench.scenes.model import Camera, Checker, Grating, ImageTexture, Motion, ZonePlate, read_only
+from aliasbench.scenes.model import Camera, Checker, Grating, ImageTexture, Motion, Scene, ZonePlate, read_only
 from aliasbench.scenes.projection import view_at
 from aliasbench.scenes.textures import evaluate_point
 
@@ -278,3 +279,15 @@ def test_time_center_is_the_middle_of_the_shutter(make_polygon, make_scene):
     frame = exact(scene(Motion((30.0, 0.0, 0.0)), 1.0), (12, 12), time="center")
     expected = make_scene([make_polygon(moved, texture="c")], textures={"c": Checker((5.0, 3.0))})
     assert np.abs(frame.pixels - exact(expected, (12, 12)).pixels).max() < 1e-12
+
+
+@pytest.mark.parametrize("per_pixel", [1.0, 1e-3, 1e-5])
+def test_an_image_of_one_colour_is_that_colour_within_the_bound_however_large_its_texels(per_pixel):
+    """Running sums of its rows are divided by how little of a texel a pixel sees."""
+    texels = np.full((16, 64, 4), np.float32(0.7))
+    corners = np.array([(-9.0, -9.0), (9.0, -9.0), (9.0, 9.0), (-9.0, 9.0)])
+    uv = (corners @ np.array([(1.0, 0.1), (-0.1, 1.0)]) - 0.5) * per_pixel / np.array([64.0, 16.0])
+    sheet = shapes.quad(np.c_[corners, np.zeros(4)], uv=uv, texture="t")
+    scene = Scene("flat", Camera("orthographic", height=8.0), (sheet,), textures={"t": ImageTexture(texels)})
+    frame = render(scene, "reference:", size=(8, 8))
+    assert np.abs(frame.pixels - texels[0, 0, 0]).max() <= frame.uncertainty < 1e-7
