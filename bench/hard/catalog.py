@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 
 from aliasbench.bench.hard import (
+    coordinates,
     coplanar,
     depth,
     edges,
@@ -31,6 +32,7 @@ _GROUPS = (
     scale.CASES,
     depth.CASES,
     footprints.CASES,
+    coordinates.CASES,
     horizon.CASES,
     motion.CASES,
     values.CASES,

@@ -9,17 +9,20 @@ import math
 
 import numpy as np
 
-from aliasbench.bench.hard.case import RASTERS, REFERENCE, RENDERERS, HardCase, Verdict, samples_key, with_keys
+from aliasbench.bench.hard.case import RASTERS, REFERENCE, HardCase, Verdict, samples_key, with_keys
 from aliasbench.bench.hard.ownership import pixel_points, worst_misplacement
+from aliasbench.bench.hard.placing import MOVING_FRAME, moved
 from aliasbench.bench.hard.sight import centres_of
+from aliasbench.bench.hard.texel_areas import areas_verdict
 from aliasbench.renderers.catalog import render
 from aliasbench.scenes.errors import InputError
 from aliasbench.scenes.model import Camera, Checker, FloatArray, ImageTexture, Scene
 from aliasbench.scenes.shapes import quad
 
 SIDE = 32
+COARSE = (8, 8)  # pictures of sheets that the reference is asked for, of which a pixel is `PX` units
+PX = SIDE / COARSE[0]
 HALF_PX = 24.015  # of a sheet: beyond the picture, and between the places that corners snap to
-FILTERING = (*RENDERERS, REFERENCE)
 HALF_ULP = 2.0**-24
 ROUNDINGS = 8.0
 SNAPPED_PX = math.sqrt(2.0) / 512.0
@@ -40,10 +43,10 @@ def sheet(
     projection: str = "orthographic",
     lean: float = LEANS[0],
 ) -> Scene:
-    """Return a textured sheet that faces the camera, so many texels a pixel; `offset` in units of uv, even.
+    """Return a textured sheet that faces the camera, so many texels a unit; `offset` in units of uv, even.
 
-    It covers the picture and goes on to the right up to `right_px`. A corner of four texels is on the pixel centre to
-    the right of and above the middle, but for the lean.
+    A unit is a pixel of a picture of `SIDE`. The sheet covers it and goes on to the right up to `right_px`. A corner of
+    four texels is on the centre of the pixel to the right of and above the middle, but for the lean.
     """
     half = HALF_PX
     corners = np.array([(-half, -half), (right_px, -half), (right_px, half), (-half, half)])
@@ -66,27 +69,44 @@ def coordinate_bound_px(subject: str, reach_px: float) -> tuple[float, str]:
     return 16.0 * 2.0**-53 * (reach_px + 100.0), "float64: 16 roundings of 2^-53 of the coordinate"
 
 
-def _misplaced(subject: str, scene: Scene) -> float:
-    truth = centres_of(scene, (SIDE, SIDE))
-    return worst_misplacement(render(scene, samples_key(subject, 1), size=(SIDE, SIDE)).pixels, truth)
+def misplaced(subject: str, scene: Scene) -> float:
+    frame = 0 if scene.is_static else MOVING_FRAME
+    truth = centres_of(scene, (SIDE, SIDE), frame, scene.animation.shutter / 2.0)
+    text = samples_key(subject, 1, "" if scene.is_static else "time=center")
+    return worst_misplacement(render(scene, text, size=(SIDE, SIDE), frame=frame).pixels, truth)
 
 
 def _owners(subject: str) -> Verdict:
     """Point sampling of a facing sheet, from 1e-3 to 1e3 texels a pixel."""
-    worst, note = 0.0, "no wrong texel"
+    if subject == REFERENCE:
+        return areas_verdict(
+            (
+                (f"{name}, {projection}, {per_pixel:g} texels a pixel", sheet(name, per_pixel / PX, **options))
+                for options in ({"projection": "orthographic", "lean": 0.1}, {"projection": "perspective"})
+                for projection in (options["projection"],)
+                for name in TEXELS
+                for per_pixel in (1e-3, 1.0, 8.0)
+            ),
+            COARSE,
+        )
+    found: list[tuple[float, str]] = []
     for projection in ("orthographic", "perspective"):
         for name in TEXELS:
             for power in (-3, -1, 0, 1, 3):
                 for lean in LEANS:
-                    found = _misplaced(subject, sheet(name, 10.0**power, projection=projection, lean=lean))
-                    if found > worst:
-                        worst, note = found, f"worst: {name}, {projection}, {10.0**power:g} texels a pixel"
+                    still = sheet(name, 10.0**power, projection=projection, lean=lean)
+                    for scene, how in ((still, ""), (moved(still), ", turning")):
+                        at = f"worst: {name}, {projection}, {10.0**power:g} texels a pixel{how}"
+                        found.append((misplaced(subject, scene), at))
+    worst, note = max(found)
     bound, why = coordinate_bound_px(subject, 34.0)
-    return Verdict(worst, "px", 0.0, bound, why, note=note)
+    return Verdict(worst, "px", 0.0, bound, why, note=note if worst else "no wrong texel")
 
 
 def _extreme_means(subject: str) -> Verdict:
     """Means of point sampled sheets at 1e4 to 1e6 texels a pixel."""
+    if subject == REFERENCE:
+        return _exact_extremes()
     worst, note, bound = 0.0, "", 0.0
     count = SIDE * SIDE * 256
     error = 0.5 / math.sqrt(count)
@@ -112,6 +132,21 @@ def _extreme_means(subject: str) -> Verdict:
     why = "4 standard errors; and where float32 is 2 texels apart only every second texel may be met"
     allowed = 4.0 * error
     return Verdict(worst, "contrast", allowed, allowed + bound, why, error, "; ".join([note, *refusals]))
+
+
+def _exact_extremes() -> Verdict:
+    """The reference's pixels at 1e4 to 1e6 texels a pixel: the texture's mean, but for repeats that sides cut."""
+    size, worst, bound, note = (2, 2), 0.0, 0.0, ""
+    for name, period, texture in (("image", 16.0, IMAGE), ("checker", 2.0, CHECKER)):
+        for power in (4, 5, 6):
+            frame = render(sheet(name, 1.0618033 * 10.0**power / (SIDE / size[0])), REFERENCE, size=size)
+            found = float(np.abs(frame.pixels - _mean_of(texture)).max())
+            # all repeats that a pixel's four sides cut together
+            cut = 4.0 * period / (1.0618033 * 10.0**power)
+            bound = max(bound, cut * (1.0 + cut / 2.0) + (frame.uncertainty or 0.0))
+            worst, note = max((worst, note), (found, f"worst: {name} at 1e{power}"))
+    why = "repeats that a pixel's sides cut, 4 times 16 texels of 1e4, are whatever they are"
+    return Verdict(worst, "contrast", bound, bound, why, note=note)
 
 
 def _coarse_mean_error(largest: float) -> float:
@@ -157,66 +192,11 @@ def _minified(subject: str) -> Verdict:
     return Verdict(worst, "contrast", OUTPUT, OUTPUT, "four roundings of a float32 colour", note=note)
 
 
-def _far_coordinates(subject: str) -> Verdict:
-    """Point sampling where texture coordinates are 1e4, 1e6 and 1e8 texels from 0."""
-    worst, note = 0.0, "no wrong texel"
-    for name in TEXELS:
-        for offset in (1e4, -1e6, 1e8):
-            for lean in LEANS:
-                found = _misplaced(subject, sheet(name, 0.25, offset=offset / TEXELS[name], lean=lean))
-                worst, note = max((worst, note), (found, f"worst: {name}, {offset:g} texels from 0"))
-    bound, why = coordinate_bound_px(subject, 34.0)
-    if subject not in RASTERS:
-        bound += 16.0 * 2.0**-53 * 1e8 / 0.25
-    return Verdict(worst, "px", 0.0, bound, why, note=note)
-
-
-def _far_filtered(subject: str) -> Verdict:
-    """Filtered look-ups 1e4 and 1e6 texels from 0 against the same ones near 0."""
-    worst, note, uncertainty = 0.0, "equal", 0.0
-    for name in TEXELS:
-        for mode in ("point", "linear") if subject == REFERENCE else ("linear", *modes_of(subject)):
-            for per_pixel in (0.25, 3.0):
-                key = with_keys(subject, f"texture={mode}")
-                near = render(sheet(name, per_pixel), key, size=(SIDE, SIDE)).pixels
-                for offset in (1e4, -1e6):
-                    scene = sheet(name, per_pixel, offset=offset / TEXELS[name])
-                    frame = render(scene, key, size=(SIDE, SIDE))
-                    found = float(np.abs(frame.pixels - near).max())
-                    uncertainty = max(uncertainty, frame.uncertainty or 0.0)
-                    worst, note = max((worst, note), (found, f"worst: {name}, {mode}, {offset:g} texels from 0"))
-    if subject == REFERENCE:
-        # the bound itself must be small beside what 8-bit pictures resolve, or it would excuse anything
-        rounding = min(2.0 * uncertainty, 1e-6)
-        why = "twice the reference's own bound"
-    elif subject in RASTERS:
-        # texels differ by at most 1 and blend over one; both axes move
-        rounding = OUTPUT + 2.0 * 3.0 * ROUNDINGS * HALF_ULP * 34.0
-        why = "8 roundings of 2^-24 of coordinates up to 34 px, at 3 texels a pixel, right and up"
-    else:
-        rounding = OUTPUT + 2.0 * 16.0 * 2.0**-53 * 1e6
-        why = "16 roundings of 2^-53 of coordinates, right and up, and 4 of the float32 colour"
-    return Verdict(worst, "contrast", rounding, rounding, why, note=note)
-
-
-_REACHES_PX = (1e3, 1e4, 1e5, 2.5e5, 1e6, 1e7)
-_CUT_PX = 2.0**17  # beyond, the rasterizer cuts surfaces in float64 near the picture's border
-
-
-def _many_repeats(subject: str) -> Verdict:
-    """Point sampling at one end of sheets up to 1e7 px long, four pixels a texel."""
-    worst, note = 0.0, "no wrong texel"
-    for name in TEXELS:
-        for reach in _REACHES_PX:
-            for lean in LEANS:
-                found = _misplaced(subject, sheet(name, 0.25, right_px=reach, lean=lean))
-                worst, note = max((worst, note), (found, f"worst: {name}, {reach:g} px long"))
-    bound, why = coordinate_bound_px(subject, min(max(_REACHES_PX), _CUT_PX) if subject in RASTERS else 1e7)
-    return Verdict(worst, "px", 0.0, bound, why, note=note)
-
-
 def _magnified(subject: str) -> Verdict:
     """Linear magnification, 1e-3 to 1e-1 texels a pixel, against the bilinear formula in float64."""
+    if subject == REFERENCE:
+        scenes = ((f"{p:g} texels a pixel", sheet("image", p / PX)) for p in (1e-3, 1e-2, 1e-1))
+        return areas_verdict(scenes, COARSE, bilinear=True)
     worst, note = 0.0, ""
     points = pixel_points((SIDE, SIDE))
     place_px = np.stack([points[:, 0] - SIDE / 2, SIDE / 2 - points[:, 1]], axis=1)
@@ -242,22 +222,27 @@ def _magnified(subject: str) -> Verdict:
     return Verdict(worst, "contrast", rounding, bound, why if subject in RASTERS else "float32 colours", note=note)
 
 
+TEXELS_OWN = (
+    "Every sample has the colour of the texel that float64 finds, but for those within the bound of a border; a "
+    "reference's pixels are the texels' areas by GEOS"
+)
+
 CASES = (
     HardCase(
         "footprints-point",
         "scale",
-        "Checker and image that face the camera, 1e-3 to 1e3 texels a pixel, borders as close as 5e-6 px to samples.",
-        "Every sample has the colour of the texel that float64 finds, but for those within the bound of a border.",
+        "Checker and image that face the camera, still and turning, 1e-3 to 1e3 texels a pixel, borders as close as "
+        "5e-6 px to samples.",
+        f"{TEXELS_OWN} (up to 8 texels a pixel).",
         _owners,
-        RENDERERS,
     ),
     HardCase(
         "footprints-extreme",
         "scale",
         "Point sampled textures of 1e4 to 1e6 texels a pixel, in 256 samples a pixel.",
-        "The picture's mean is the texture's, or the renderer refuses and says why and what to do.",
+        "The picture's mean is the texture's, or the renderer refuses and says why and what to do; a reference's "
+        "pixels are, but for repeats that their sides cut.",
         _extreme_means,
-        RENDERERS,
     ),
     HardCase(
         "footprints-minified",
@@ -265,38 +250,12 @@ CASES = (
         "Checker and image of 64 to 1e6 texels a pixel under every minification.",
         "Every pixel is the texture's mean.",
         _minified,
-        FILTERING,
     ),
     HardCase(
         "footprints-magnified",
         "scale",
         "An image of 1e-3 to 1e-1 texels a pixel, looked up bilinearly.",
-        "Every pixel is what the bilinear formula gives in float64.",
+        "Every pixel is what the bilinear formula gives in float64; a reference's is the formula's integral over it.",
         _magnified,
-        RENDERERS,
-    ),
-    HardCase(
-        "coordinates-far-point",
-        "scale",
-        "Texture coordinates 1e4, -1e6 and 1e8 texels from 0.",
-        "Every sample has the colour of the texel that float64 finds, but for those within the bound of a border.",
-        _far_coordinates,
-        RENDERERS,
-    ),
-    HardCase(
-        "coordinates-far-filtered",
-        "scale",
-        "Filtered look-ups at texture coordinates 1e4 and -1e6 texels from 0.",
-        "The picture is the one of the same surface with coordinates near 0.",
-        _far_filtered,
-        FILTERING,
-    ),
-    HardCase(
-        "repeats-many",
-        "scale",
-        "One end of surfaces 1e3 to 1e7 px long on which a texture repeats all along, 4 px a texel.",
-        "Every sample has the colour of the texel that float64 finds, but for those within the bound of a border.",
-        _many_repeats,
-        RENDERERS,
     ),
 )

@@ -5,9 +5,10 @@ import math
 import numpy as np
 
 from aliasbench.bench.hard.case import RASTERS, REFERENCE, RENDERERS, HardCase, Verdict, samples_key, with_keys
-from aliasbench.bench.hard.footprints import FILTERING, OUTPUT, coordinate_bound_px, modes_of
+from aliasbench.bench.hard.footprints import OUTPUT, coordinate_bound_px, modes_of
 from aliasbench.bench.hard.ownership import worst_misplacement
 from aliasbench.bench.hard.sight import centres_of
+from aliasbench.bench.hard.texel_areas import areas_verdict
 from aliasbench.renderers.catalog import render
 from aliasbench.scenes.model import Camera, Checker, Scene
 from aliasbench.scenes.shapes import quad
@@ -32,6 +33,9 @@ def horizon(size: tuple[int, int] = _HORIZON_SIZE, far: float = _FLOOR) -> Scene
 
 def _horizon_owners(subject: str) -> Verdict:
     """Point sampling of a floor up to the horizon: whose the samples are."""
+    if subject == REFERENCE:
+        scenes = [("up to 12 rows from the bottom", horizon(far=_REFERENCE_FLOOR))]
+        return areas_verdict(scenes, _HORIZON_SIZE, rows=slice(36, None))
     scene, size = horizon(), _HORIZON_SIZE
     truth = centres_of(scene, size)
     pixels = render(scene, samples_key(subject, 1), size=size).pixels
@@ -82,9 +86,9 @@ CASES = (
         "horizon-point",
         "scale",
         "A checker floor a million units deep, up to its horizon, point sampled.",
-        "All is finite, and every sample farther than the bound from a border of squares is its square's.",
+        "All is finite, and every sample farther than the bound from a border of squares is its square's; the "
+        "reference's last rows are the squares' areas by GEOS.",
         _horizon_owners,
-        RENDERERS,
     ),
     HardCase(
         "horizon-filtered",
@@ -92,13 +96,12 @@ CASES = (
         "The row of pixels under the horizon, where a pixel holds 1e3 squares and more, under every minification.",
         "All is finite, and the row is the floor's mean; the reference's less the sky where its floor ends.",
         _horizon_filtered,
-        FILTERING,
     ),
     HardCase(
         "horizon-mean",
         "scale",
         "The two rows under the horizon, point sampled 128 times a pixel in a picture 1024 wide.",
-        "Their mean is the floor's.",
+        "Their mean is the floor's, to what so many samples allow; exact rows are asked for by horizon-filtered.",
         _horizon_mean,
         RENDERERS,
     ),

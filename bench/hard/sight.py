@@ -82,6 +82,19 @@ def _depth(rays: tuple[FloatArray, FloatArray], corners: FloatArray) -> FloatArr
     return out
 
 
+def texel_place_at(
+    scene: Scene, size: tuple[int, int], points: FloatArray, *, frame: int = 0, fraction: float = 0.0
+) -> FloatArray:
+    """Return (n, 2): where in the texture, in texels, rays through `points` meet a scene's first object's plane."""
+    view, surface = view_at(scene.camera, scene.animation, frame, fraction, size), scene.objects[0]
+    matrix = object_matrix(surface.motion, scene.animation, frame, fraction)
+    corners = surface.vertices @ matrix[:3, :3].T + matrix[:3, 3]
+    if surface.texture is None or surface.uv is None:
+        raise TypeError("an object without texture has no texels")
+    rays = view.ray(points[:, 0], points[:, 1])
+    return _texel_place(scene.textures[surface.texture], corners, surface.uv, rays)
+
+
 def _texel_place(
     texture: Texture, corners: FloatArray, uv: FloatArray, rays: tuple[FloatArray, FloatArray]
 ) -> FloatArray:

@@ -7,7 +7,7 @@ from itertools import count
 import numpy as np
 import pytest
 
-from aliasbench.bench.hard import depth, footprints, horizon, ladder, scale
+from aliasbench.bench.hard import coordinates, depth, footprints, horizon, ladder, scale, texel_areas
 from aliasbench.bench.hard.case import EGL, REFERENCE, TRACER, with_keys
 from aliasbench.bench.hard.ownership import pixel_points
 from aliasbench.bench.hard.sight import centres_of, what_is_seen
@@ -17,7 +17,7 @@ from aliasbench.scenes.errors import InputError
 from aliasbench.scenes.model import Camera, Checker, Scene, as_vec3
 from aliasbench.scenes.shapes import quad
 
-MODULES = (scale, depth, footprints, horizon, ladder)
+MODULES = (scale, depth, footprints, coordinates, horizon, ladder, texel_areas)
 CASES = {c.name: c for m in MODULES for c in getattr(m, "CASES", ())}
 
 # Outcomes of tracers, rasterizers and the reference; "-": not asked.
@@ -29,16 +29,16 @@ OUTCOMES = {
     "meshes-far-from-origin": ("limit", "limit", "ok"),
     "telescope": ("limit", "limit", "-"),
     "surfaces-vast": ("limit", "limit", "-"),
-    "depth-range": ("limit", "limit", "-"),
+    "depth-range": ("limit", "limit", "ok"),
     "depth-close": ("limit", "limit", "ok"),
-    "footprints-point": ("ok", "limit", "-"),
-    "footprints-extreme": ("ok", "limit", "-"),
+    "footprints-point": ("ok", "limit", "ok"),
+    "footprints-extreme": ("ok", "limit", "ok"),
     "footprints-minified": ("ok", "ok", "ok"),
-    "footprints-magnified": ("ok", "ok", "-"),
-    "coordinates-far-point": ("ok", "ok", "-"),
+    "footprints-magnified": ("ok", "ok", "ok"),
+    "coordinates-far-point": ("ok", "ok", "ok"),
     "coordinates-far-filtered": ("ok", "ok", "ok"),
-    "repeats-many": ("ok", "limit", "-"),
-    "horizon-point": ("limit", "limit", "-"),
+    "repeats-many": ("ok", "limit", "ok"),
+    "horizon-point": ("limit", "limit", "ok"),
     "horizon-filtered": ("ok", "ok", "ok"),
     "horizon-mean": ("ok", "ok", "-"),
 }
@@ -83,7 +83,14 @@ def change_pictures(monkeypatch, change):
         ("scales-exposed", TRACER),
         ("meshes-far-from-origin", REFERENCE),
         ("depth-close", REFERENCE),
+        ("depth-range", REFERENCE),
+        ("footprints-point", REFERENCE),
         ("footprints-extreme", TRACER),
+        ("footprints-extreme", REFERENCE),
+        ("footprints-magnified", REFERENCE),
+        ("coordinates-far-point", REFERENCE),
+        ("repeats-many", REFERENCE),
+        ("horizon-point", REFERENCE),
         ("footprints-minified", EGL),
         ("footprints-minified", REFERENCE),
         ("footprints-magnified", EGL),
