@@ -14,22 +14,39 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from aliasbench.bench.hard.case import Verdict
+from aliasbench.bench.hard.ladder import HALF_ULP, RAY_ROUNDINGS
 from aliasbench.bench.hard.ownership import distance_to_outline, inside, pixel_points
+from aliasbench.bench.hard.painting import TIE_PX
 from aliasbench.renderers.frame import Frame
 from aliasbench.scenes.model import Animation, Camera, FloatArray, Motion, Scene, Spin, Vec3
 from aliasbench.scenes.shapes import polygon
 
-# Half an ulp of a coordinate is 2^-24 of it. Vertex, ray origin and their difference are rounded, then the products
-# that tell on which side of an edge a ray is: four roundings, each moving an edge by at most its own half ulp.
-FLOAT32_ROUNDINGS = 4
-# Texture coordinates in a rasterizer: the vertex's, differences of two, slope (product, quotient), times x, sum.
-INTERPOLATION_ROUNDINGS = 6
 SIZE = (32, 24)
 FPS = 30.0
 OPEN = Animation(fps=FPS, frames=1, shutter=1.0)
 Z: Vec3 = (0.0, 0.0, 1.0)
 HUB: Vec3 = (0.0, 0.0, 0.0)
 BLADE = np.array([(1.7, -3.2), (11.3, -2.6), (10.9, 4.1), (2.2, 3.7)])
+TEETH = 12
+
+
+def _comb() -> FloatArray:
+    """Return one outline whose edges pass centres of `SIZE`'s pixels ever more closely."""
+    points = [(-13.3, -9.7), (13.4, -9.9)]
+    for tooth in range(TEETH):
+        right, lean = 12.5 - 2.0 * tooth, 0.618 * 4.0**-tooth
+        points += [(right + lean, -8.6), (right - lean, 8.3), (right - 0.9, 8.2), (right - 1.1, -8.6)]
+    return np.array(points)
+
+
+COMB = _comb()
+PINHOLE_PX = 48.0  # a perspective camera's distance from the plane z = 0, of which a unit is a pixel
+PINHOLE = Camera(
+    "perspective", (0.0, 0.0, PINHOLE_PX), fov_y_deg=2.0 * math.degrees(math.atan(SIZE[1] / 2.0 / PINHOLE_PX))
+)
+# A pinhole's rays turn about it by roundings of the distance to a corner over that to the edge, each 48 px and more,
+# which at an angle off the axis are 48 px / cos^2 a radian: with corners up to 17 px aside in a plane 48 px away.
+PINHOLE_REACH = PINHOLE_PX * (1.0 + (17.0 / PINHOLE_PX) ** 2) * math.hypot(1.0, 17.0 / PINHOLE_PX)
 IDENTITY = tuple(np.eye(4).ravel().tolist())
 RASTER_PX = 2.0**0.5 / 512
 RASTER_WHY = (
@@ -86,12 +103,8 @@ def find_misses(pixels: NDArray[np.floating], size: tuple[int, int], outlines: S
     """
     points = pixel_points(size)
     count = len(outlines)
-    seen, far = np.zeros(len(points)), np.full((count, len(points)), np.inf)
-    for k, outline in enumerate(outlines):
-        if outline is not None:
-            there = to_picture(outline, size)
-            seen += inside(points, there)
-            far[k] = distance_to_outline(points, there)
+    there = [None if outline is None else to_picture(outline, size) for outline in outlines]
+    seen = np.sum([np.zeros(len(points)), *(inside(points, o) for o in there if o is not None)], axis=0)
     found = np.asarray(pixels, dtype=np.float64).reshape(-1, 3) * count
     whole = np.rint(found)
     if not np.isfinite(found).all() or np.abs(found - whole).max() > 1e-3 or np.ptp(whole, axis=1).max() > 0.0:
@@ -100,13 +113,17 @@ def find_misses(pixels: NDArray[np.floating], size: tuple[int, int], outlines: S
     wrong = np.flatnonzero(missed)
     if not len(wrong):
         return Miss(0.0, 0)
-    nearest = np.sort(far, axis=0)
-    return Miss(float(nearest[np.minimum(missed[wrong], count) - 1, wrong].max()), len(wrong))
+    far = np.array([np.full(len(wrong), np.inf) if o is None else distance_to_outline(points[wrong], o) for o in there])
+    nth = np.minimum(missed[wrong], count) - 1
+    return Miss(float(np.take_along_axis(np.sort(far, axis=0), nth[None], axis=0).max()), len(wrong))
 
 
-def float32_px(reach_px: float, roundings: int = FLOAT32_ROUNDINGS) -> float:
-    """Return by how much float32 may move an edge of a polygon whose vertices and rays are up to `reach_px` away."""
-    return roundings * reach_px * 2.0**-24
+def float32_px(reach_px: float, roundings: float = RAY_ROUNDINGS) -> float:
+    """Return by how much float32 may move an edge of a polygon whose corners are up to `reach_px` from rays' origins.
+
+    See `ladder` for the roundings.
+    """
+    return roundings * reach_px * HALF_ULP
 
 
 def seeds_error(means: Sequence[float]) -> tuple[float, float]:
@@ -141,11 +158,11 @@ def judge_places(subject: str, misses: Iterable[Miss], reach_px: float, why: str
     worst, pixels = max(m.px for m in found), sum(m.pixels for m in found)
     is_raster = subject.startswith("raster")
     bound = RASTER_PX if is_raster else float32_px(reach_px)
-    reason = (
-        RASTER_WHY if is_raster else f"{FLOAT32_ROUNDINGS} roundings of coordinates up to {reach_px:g} px to 24 bits"
-    )
+    reason = RASTER_WHY if is_raster else f"float32 rays: {RAY_ROUNDINGS:g} roundings of 2^-24 of up to {reach_px:g} px"
     why = f"{reason}{f', and {why}' if why else ''}"
-    return Verdict(worst, "px", more_px, bound + more_px, why, note=f"{pixels} pixels differ from the float64 truth")
+    return Verdict(
+        worst, "px", max(TIE_PX, more_px), bound + more_px, why, note=f"{pixels} pixels differ from the float64 truth"
+    )
 
 
 def judge_reference(frame: Frame, expected: ArrayLike, what: str, more: float = 0.0) -> Verdict:

@@ -4,11 +4,16 @@ import math
 
 import numpy as np
 
-from aliasbench.bench.hard.case import METRICS, REFERENCE, HardCase, Verdict, samples_key
-from aliasbench.bench.hard.passing import FLOAT32_ROUNDINGS, INTERPOLATION_ROUNDINGS, float32_px, largest_error
+from aliasbench.bench.hard.case import METRICS, REFERENCE, HardCase, Verdict, samples_key, with_keys
+from aliasbench.bench.hard.footprints import ROUNDINGS
+from aliasbench.bench.hard.ladder import RAY_ROUNDINGS
+from aliasbench.bench.hard.painting import TIE_PX
+from aliasbench.bench.hard.passing import float32_px, largest_error
+from aliasbench.bench.hard.placing import MOVING_FRAME, moved
 from aliasbench.metrics.catalog import measure
 from aliasbench.metrics.spectral_line import recover_frequency
 from aliasbench.renderers.catalog import prepare, render
+from aliasbench.renderers.frame import Frame
 from aliasbench.scenes.catalog import SCENES
 from aliasbench.scenes.model import Camera, Checker, FloatArray, Grating, Scene, Texture
 from aliasbench.scenes.shapes import mesh, quad
@@ -46,6 +51,12 @@ def _dirichlet(frequency: float, count: int) -> float:
     return math.sin(math.pi * frequency) / (count * math.sin(math.pi * frequency / count))
 
 
+def _shown(scene: Scene, technique: str) -> list[Frame]:
+    """Return a scene's picture, and that when it has turned twice and is where it was."""
+    turning = render(moved(scene), with_keys(technique, "time=center"), size=SIZE, frame=MOVING_FRAME)
+    return [render(scene, technique, size=SIZE), turning]
+
+
 def _grating(subject: str) -> Verdict:
     """Sine gratings by texture."""
     worst, stated = 0.0, 0.0
@@ -53,29 +64,25 @@ def _grating(subject: str) -> Verdict:
         scene = _bands(frequency, {"wave": Grating(frequency)}, 1.0)
         wave = np.cos(2 * np.pi * _cycles(frequency))[..., None] / 2
         if subject == REFERENCE:
-            frame = render(scene, subject, size=SIZE)
-            stated = max(stated, frame.uncertainty or 0.0)
-            worst = max(worst, largest_error(frame.pixels, 0.5 + float(np.sinc(frequency)) * wave))
+            for frame in _shown(scene, subject):
+                stated = max(stated, frame.uncertainty or 0.0)
+                worst = max(worst, largest_error(frame.pixels, 0.5 + float(np.sinc(frequency)) * wave))
             continue
         for count in (1, 4):
             text = samples_key(subject, count**2, "sampler=grid" if count > 1 else "")
-            pixels = render(scene, text, size=SIZE).pixels
-            worst = max(worst, largest_error(pixels, 0.5 + _dirichlet(frequency, count) * wave))
+            for frame in _shown(scene, text):
+                worst = max(worst, largest_error(frame.pixels, 0.5 + _dirichlet(frequency, count) * wave))
     if subject == REFERENCE:
         allowed = max(stated, 1e-9)
         return Verdict(worst, "contrast", allowed, allowed, f"the bound of {stated:.1e} that the reference states")
-    allowed = math.pi * max(FREQUENCIES) * float32_px(REACH + 2.0, _roundings(subject)) + OUTPUT_ROUNDING
-    return Verdict(
-        worst, "contrast", OUTPUT_ROUNDING, allowed, f"{_coordinates_why(subject)}, at a slope of pi a cycle"
-    )
+    if not subject.startswith("raster"):
+        why = "two roundings of a float32 pixel: rays and textures are float64"
+        return Verdict(worst, "contrast", OUTPUT_ROUNDING, OUTPUT_ROUNDING, why)
+    allowed = math.pi * max(FREQUENCIES) * float32_px(REACH + 2.0, ROUNDINGS) + OUTPUT_ROUNDING
+    return Verdict(worst, "contrast", OUTPUT_ROUNDING, allowed, f"{COORDINATES_WHY}, at a slope of pi a cycle")
 
 
-def _roundings(subject: str) -> int:
-    return INTERPOLATION_ROUNDINGS if subject.startswith("raster") else FLOAT32_ROUNDINGS
-
-
-def _coordinates_why(subject: str) -> str:
-    return f"texture coordinates up to {REACH + 2:g} of 24 bits, rounded {_roundings(subject)} times on their way"
+COORDINATES_WHY = f"texture coordinates up to {REACH + 2:g} px of 24 bits, rounded {ROUNDINGS:g} times on their way"
 
 
 def _white_before(cycles: FloatArray) -> FloatArray:
@@ -91,25 +98,26 @@ def _square_wave(subject: str, scene: Scene, frequency: float) -> tuple[float, f
     from a border.
     """
     cycles = _cycles(frequency)
-    frame = render(scene, subject if subject == REFERENCE else samples_key(subject, 1), size=SIZE)
+    frames = _shown(scene, subject if subject == REFERENCE else samples_key(subject, 1))
     if subject == REFERENCE:
         covered = _white_before(cycles + frequency / 2) - _white_before(cycles - frequency / 2)
-        return largest_error(frame.pixels, covered[..., None] / frequency), frame.uncertainty or 0.0
+        errors = [largest_error(frame.pixels, covered[..., None] / frequency) for frame in frames]
+        return max(errors), max(frame.uncertainty or 0.0 for frame in frames)
     is_white = cycles - np.floor(cycles) < 0.5
-    wrong = ~(np.abs(frame.pixels - is_white[..., None]).max(axis=-1) <= 1e-6)
     far = np.abs(2 * cycles - np.rint(2 * cycles)) / (2 * frequency)
-    return float(far[wrong].max(initial=0.0)), 0.0
+    wrong = [~(np.abs(frame.pixels - is_white[..., None]).max(axis=-1) <= 1e-6) for frame in frames]
+    return max(float(far[each].max(initial=0.0)) for each in wrong), 0.0
 
 
-def _borders(subject: str, found: list[tuple[float, float]], raster_px: float, raster_why: str) -> Verdict:
+def _borders(
+    subject: str, found: list[tuple[float, float]], raster: tuple[float, str], ray: tuple[float, str]
+) -> Verdict:
     worst, stated = (max(values) for values in zip(*found, strict=True))
     if subject == REFERENCE:
         allowed = max(stated, 1e-9)
         return Verdict(worst, "contrast", allowed, allowed, f"the bound of {stated:.1e} that the reference states")
-    if subject.startswith("raster"):
-        return Verdict(worst, "px", 0.0, raster_px, raster_why)
-    why = f"coordinates up to {REACH + 2:g} px of 24 bits, rounded {FLOAT32_ROUNDINGS} times on their way"
-    return Verdict(worst, "px", 0.0, float32_px(REACH + 2.0), why)
+    bound, why = raster if subject.startswith("raster") else ray
+    return Verdict(worst, "px", TIE_PX, bound, why)
 
 
 def _checker(subject: str) -> Verdict:
@@ -119,7 +127,9 @@ def _checker(subject: str) -> Verdict:
         # even squares are white here: (floor(2 nu u) + floor(v)) even is black
         checker = Checker((2.0 * frequency, 0.5), black=(1.0, 1.0, 1.0), white=(0.0, 0.0, 0.0))
         found.append(_square_wave(subject, _bands(frequency, {"wave": checker}, 1.0), frequency))
-    return _borders(subject, found, float32_px(REACH + 2.0, _roundings(subject)), _coordinates_why(subject))
+    # a sample on a border is either square's, and a turn takes it off by what float64 rounds of that
+    rays = (TIE_PX, "rays and textures are float64: only samples on a border may fall to either side")
+    return _borders(subject, found, (float32_px(REACH + 2.0, ROUNDINGS), COORDINATES_WHY), rays)
 
 
 def _bars(subject: str) -> Verdict:
@@ -137,7 +147,8 @@ def _bars(subject: str) -> Verdict:
         bars = mesh(corners, np.concatenate([firsts + np.array(fan) for fan in ((0, 1, 2), (0, 2, 3))]))
         scene = Scene("hard", Camera("orthographic", height=float(SIZE[1])), (bars,))
         found.append(_square_wave(subject, scene, frequency))
-    return _borders(subject, found, RASTER_EDGE_PX, "vertices are snapped to 1/256 px, half of that either way")
+    rays = (float32_px(REACH), f"float32 rays: {RAY_ROUNDINGS:g} roundings of 2^-24 of up to {REACH:g} px")
+    return _borders(subject, found, (RASTER_EDGE_PX, "vertices are snapped to 1/256 px, half of that either way"), rays)
 
 
 def _metrics(subject: str) -> Verdict:  # noqa: ARG001 - the metrics are the only subject
@@ -210,14 +221,14 @@ CASES = (
     HardCase(
         "nyquist-grating",
         "motion",
-        "Sine gratings of exactly 0.5 and 1 cycles/px, as textures, at 16 phases.",
+        "Sine gratings of exactly 0.5 and 1 cycles/px, as textures, at 16 phases, still and after two turns.",
         "One and 4 x 4 regular samples equal their closed forms (amplitude 1, D_4), the reference sinc(nu).",
         _grating,
     ),
     HardCase(
         "nyquist-checker",
         "motion",
-        "Checkers of exactly one and two squares a pixel, borders at samples or close beside them.",
+        "Checkers of exactly one and two squares a pixel, borders at or beside samples, still and after two turns.",
         "Wrong samples are no farther from a border than the bound; the reference equals the covered shares.",
         _checker,
     ),

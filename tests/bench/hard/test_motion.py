@@ -7,17 +7,26 @@ from typing import Any
 
 import numpy as np
 import pytest
+import shapely
 
 from aliasbench.bench.hard import motion, passing, periodic, stillness
-from aliasbench.bench.hard.case import METRICS, RASTERS, REFERENCE, TRACER, HardCase
+from aliasbench.bench.hard.case import METRICS, RASTERS, REFERENCE, RENDERERS, TRACER, HardCase
 from aliasbench.metrics.catalog import measure
 from aliasbench.renderers.frame import Frame
 from aliasbench.scenes.model import FloatArray, Motion, Spin
 from aliasbench.scenes.motion import object_matrix
 
 CASES = {case.name: case for case in motion.CASES}
-# All else is exact.
-LIMITS = {(name, subject) for name in ("nyquist-grating", "nyquist-bars") for subject in RASTERS}
+# All else is exact. Edges of a comb are so close to samples that any misplacement shows.
+LIMITS = {
+    (name, subject)
+    for subjects, names in (
+        (RASTERS, ("nyquist-grating", "nyquist-bars", "late-spin", "half-turn-matrix", "fly-through")),
+        (RENDERERS, ("late-flight", "half-turn", "hundred-turns")),
+    )
+    for name in names
+    for subject in subjects
+}
 
 
 @pytest.mark.parametrize(
@@ -146,6 +155,28 @@ def test_wrong_metrics_fail(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(periodic, "measure", wrong)
     assert CASES["nyquist-metrics"].check(METRICS).outcome == "failed"
+
+
+def test_edges_of_the_comb_are_at_all_distances_from_samples() -> None:
+    outline = passing.to_picture(passing.COMB, passing.SIZE)
+    distance = passing.distance_to_outline(passing.pixel_points(passing.SIZE), outline)
+    counts = np.histogram(np.log10(distance), bins=np.arange(-8.0, 0.0))[0]
+    assert (counts >= 10).all()
+    polygon = shapely.Polygon(passing.COMB)
+    assert polygon.is_valid
+
+
+@pytest.mark.parametrize("name", ["late-spin", "late-flight", "half-turn", "hundred-turns"])
+def test_a_body_that_is_a_ten_thousandth_of_a_pixel_aside_fails(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    comb = passing.COMB.copy()
+
+    def aside(outline: FloatArray, *more: Any, **options: Any) -> Any:
+        scale = np.ptp(outline[:, 0]) / np.ptp(comb[:, 0])
+        return passing.one_polygon(outline + 1e-4 * scale, *more, **options)
+
+    for module in (motion, stillness):
+        monkeypatch.setattr(module, "one_polygon", aside)
+    assert CASES[name].check(TRACER).outcome == "failed"
 
 
 @pytest.mark.parametrize("shift", [0.3, 0.01])
