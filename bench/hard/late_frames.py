@@ -1,14 +1,21 @@
 """Frame numbers up to the largest: time is a product of the frame's number, and must not lose the picture's bits."""
 
-import math
+from fractions import Fraction
 
 import numpy as np
 
-from aliasbench.bench.hard.case import RASTERS, REFERENCE, HardCase, Verdict, samples_key, with_keys
-from aliasbench.bench.hard.triangles import SNAP, ULP, coverage_error, grid_offsets, least_misplacement, triangle_scene
+from aliasbench.bench.hard.case import REFERENCE, HardCase, Verdict, samples_key, with_keys
+from aliasbench.bench.hard.passing import COMB, SIZE, turned
+from aliasbench.bench.hard.triangles import (
+    coverage_error,
+    grid_offsets,
+    in_pixels,
+    least_misplacement,
+    misplaced_px,
+    misplaced_why,
+)
 from aliasbench.renderers.catalog import prepare, render
 from aliasbench.scenes.model import Animation, Camera, Motion, Scene, Spin, Surface
-from aliasbench.scenes.motion import rotation_matrix
 from aliasbench.scenes.shapes import polygon
 
 LATE = (4 * 10**9, 2**53 - 4, 2**53)
@@ -34,44 +41,42 @@ def _late_frames(subject: str) -> Verdict:
 
 def _late_turns(subject: str) -> Verdict:
     """Turns that are no binary fraction of a frame, late: the angle is known in whole numbers."""
-    size, frame = (48, 40), 10**9 + 7
-    corners = np.array([(0.0, 0.0, 0.0), (17.3, -2.8, 0.0), (16.1, 3.9, 0.0)])
+    size, frame = SIZE, 10**9 + 7
+    turns = Fraction(235 * frame % 300, 300)
+    corners = np.c_[turned(COMB, -turns), np.zeros(len(COMB))]
     spin = Spin((0.0, 0.0, 1.0), (0.0, 0.0, 0.0), 23.5)
     camera, animation = Camera("orthographic", height=float(size[1])), Animation(30.0, 1, 0.0)
     moving = Scene("hard", camera, (polygon(corners, motion=Motion(spin=spin)),), animation=animation)
-    turns = (235 * frame % 300) / 300
-    turned = Scene("hard", camera, (polygon(corners @ rotation_matrix(spin.axis, turns).T),))
+    still = Scene("hard", camera, (polygon(np.c_[COMB, np.zeros(len(COMB))]),))
     reach = float(np.linalg.norm(corners, axis=1).max())
     # the turns of one frame are rounded once, by up to half of 2^-53 of them, and multiplied by the frame's number
     drift = 2.0 * np.pi * reach * frame * (23.5 / 30.0) * 2.0**-53
     pixels = render(moving, subject, size=size, frame=frame)
     why = f"turns a frame have 53 bits: {drift:.1e} px at frame {frame}"
     if subject == REFERENCE:
-        error = coverage_error(pixels.pixels, turned, size)
-        bound = drift * math.sqrt(2.0) + (pixels.uncertainty or 0.0) + 8.0 * size[0] * size[1] * 2.0**-52
-        return Verdict(error, "contrast", bound, bound, f"{why}, along an edge of up to sqrt 2 px a pixel")
-    worst = least_misplacement(pixels.pixels, turned, size, grid_offsets(1))
-    bound = drift + 4.0 * max(size) * ULP + (SNAP if subject in RASTERS else 0.0)
-    return Verdict(worst, "px", 0.0, bound, f"{why}; coordinates have 24 bits, vertices are snapped to 1/256 px")
+        error = coverage_error(pixels.pixels, still, size)
+        bound = 2.0 * 1.01 * drift + (pixels.uncertainty or 0.0) + 8.0 * size[0] * size[1] * 2.0**-52
+        return Verdict(error, "contrast", bound, bound, f"{why}, along two upright edges in a pixel")
+    worst = least_misplacement(pixels.pixels, still, size, grid_offsets(1))
+    return Verdict(worst, "px", drift, drift + misplaced_px(subject, size), f"{why}; {misplaced_why(subject)}")
 
 
 def _late_flight(subject: str) -> Verdict:
     """Camera and object fly along together for a billion frames: float32 sees only what is near."""
-    size, frame = (31, 23), 10**9
-    shape = triangle_scene(size).objects[0]
+    size, frame = SIZE, 10**9
+    shape = polygon(np.c_[COMB, np.zeros(len(COMB))])
     flying = Surface(shape.vertices, shape.triangles, motion=Motion((3.0, 1.0, 0.0)))
     camera = Camera("orthographic", height=float(size[1]), velocity=(3.0, 1.0, 0.0))
     scene = Scene("hard", camera, (flying,), animation=Animation(1.0, 1, 0.0))
     frame_of = render(scene, subject, size=size, frame=frame)
-    drift = math.sqrt(2.0) * 3.0 * 2.0**-22  # of both, and their difference: half a step of float64 at 3e9 is 2^-22
+    drift = 2.0**0.5 * 3.0 * 2.0**-22  # of both, and their difference: half a step of float64 at 3e9 is 2^-22
     why = "float64 at 3e9 units resolves 2^-22 units, a unit is a pixel"
-    still = triangle_scene(size)
+    still = in_pixels(size, shape)
     if subject == REFERENCE:
-        bound = drift * math.sqrt(2.0) + (frame_of.uncertainty or 0.0)
+        bound = 2.0 * 1.01 * drift + (frame_of.uncertainty or 0.0)
         return Verdict(coverage_error(frame_of.pixels, still, size), "contrast", bound, bound, why)
     worst = least_misplacement(frame_of.pixels, still, size, grid_offsets(1))
-    bound = drift + 4.0 * max(size) * ULP + (SNAP if subject in RASTERS else 0.0)
-    return Verdict(worst, "px", 0.0, bound, f"{why}; 24 bits and 1/256 px as in any picture")
+    return Verdict(worst, "px", drift, drift + misplaced_px(subject, size), f"{why}; {misplaced_why(subject)}")
 
 
 CASES = (
@@ -85,7 +90,7 @@ CASES = (
     HardCase(
         "late-turns",
         "sizes",
-        "A blade at 23.5 rev/s and 30 frames/s, a billion frames later.",
+        "A comb at 23.5 rev/s and 30 frames/s, a billion frames later.",
         "Samples have the owners that the angle, reckoned in whole numbers, gives them.",
         _late_turns,
     ),

@@ -7,12 +7,14 @@ on black, whose samples' owners are known in float64.
 
 import math
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
 from aliasbench.bench.hard import empty, flat_signals, late_frames, refusals, texel_counts
 from aliasbench.bench.hard.case import RASTERS, REFERENCE, HardCase, Verdict, samples_key, with_keys
 from aliasbench.bench.hard.ownership import distance_to_outline, inside, outline_px, pixel_points
+from aliasbench.bench.hard.painting import TIE_PX
 from aliasbench.bench.hard.triangles import (
     SNAP,
     ULP,
@@ -22,6 +24,9 @@ from aliasbench.bench.hard.triangles import (
     grid_offsets,
     in_pixels,
     least_misplacement,
+    misplaced_px,
+    misplaced_why,
+    near_edge_scene,
     triangle_scene,
 )
 from aliasbench.renderers.catalog import render
@@ -30,6 +35,7 @@ from aliasbench.scenes.model import FloatArray, Scene
 from aliasbench.scenes.shapes import polygon
 
 SMALL: tuple[Size, ...] = ((1, 1), (1, 13), (13, 1), (2, 3), (3, 2), (17, 31), (31, 7))
+GAPS_PX = (1e-2, -3e-3, 1e-3, -1e-4, 1e-5, -1e-6, 1e-7)
 WIDE: tuple[Size, ...] = ((16384, 8), (8, 16384), (65536, 1), (1, 65536))
 
 
@@ -50,24 +56,19 @@ def _pictures(subject: str, sizes: tuple[Size, ...], side: int, scenes: tuple[Ca
                 asked.append((with_keys(subject, "msaa=4"), hardware_offsets(subject)))
             pictures = [(render(scene, text, size=size).pixels, offsets) for text, offsets in asked]
             error = max(least_misplacement(p, scene, size, offsets) for p, offsets in pictures)
-            far = max(far, float(max(size)))
+            far = max(far, misplaced_px(subject, size))
         if error > worst:
             worst, where = error, f"{size[0]} x {size[1]}"
     note = f"worst at {where}" if where else ""
     if subject == REFERENCE:
         why = "a reference is as far off as it says, and GEOS' areas lose 8 w h 2^-52"
         return Verdict(worst, "contrast", known, known, why, note=note)
-    snap = SNAP if subject in RASTERS else 0.0
-    # matrix, place in the picture or along the ray, and edge equation, at up to `far` px from the origin in use
-    bound = snap + 4.0 * far * ULP
-    why = f"four roundings of a coordinate of up to {far:g} px to 24 bits" + (
-        ", and vertices snapped to 1/256 px: sqrt 2 / 512 px" if snap else ""
-    )
-    return Verdict(worst, "px", 0.0, bound, why, note=note)
+    return Verdict(worst, "px", TIE_PX, far, misplaced_why(subject), note=note)
 
 
 def _small(subject: str) -> Verdict:
-    return _pictures(subject, SMALL, 4, (triangle_scene,))
+    near = tuple(partial(near_edge_scene, gap_px=gap) for gap in GAPS_PX)
+    return _pictures(subject, SMALL, 4, (triangle_scene, *near))
 
 
 def _wide(subject: str) -> Verdict:
@@ -216,7 +217,7 @@ CASES = (
         "sizes",
         "FXAA, SMAA and TAA where a picture has no neighbours: 1 x 1, 1 x 13, 2 x 3, 257 x 3.",
         "FXAA and SMAA change only pixels beside a different one, within the range of their neighbours; TAA is the "
-        "mean of its frames.",
+        "mean of its frames. Only rasterizers process.",
         _post,
         RASTERS,
     ),
@@ -224,7 +225,7 @@ CASES = (
         "post-processing-of-too-wide-pictures",
         "sizes",
         "FXAA, SMAA and TAA need the picture in one part: 65536 x 1.",
-        "Drawn where the device can, else refused in a sentence with the size and the largest one.",
+        "Drawn where the device can, else refused with the size and the largest one. Only rasterizers process.",
         _post_too_wide,
         RASTERS,
     ),

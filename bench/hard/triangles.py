@@ -6,6 +6,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from aliasbench.bench.hard.case import RASTERS
+from aliasbench.bench.hard.ladder import RAY_ROUNDINGS
 from aliasbench.bench.hard.ownership import distance_to_outline, inside, outline_px, pixel_points
 from aliasbench.scenes.model import Camera, FloatArray, Scene, Surface
 from aliasbench.scenes.shapes import polygon
@@ -13,7 +15,38 @@ from aliasbench.scenes.shapes import polygon
 Size = tuple[int, int]
 ULP = 2.0**-24  # half a step of float32, relative
 SNAP = math.sqrt(2.0) / 512  # px: a vertex moves by up to half of 1/256 px along each axis
+_CUT_PX = 1.0 / 256.0
 _MOST_CUT = 10_000
+
+
+def misplaced_px(subject: str, size: Size) -> float:
+    """Return by how many pixels a subject may misplace an edge in a picture of `size`: see `ladder`.
+
+    Corners, rays' origins and directions round once each, up to half a diagonal from the picture's middle; the edge
+    test's other roundings are of the distance between ray and corner, up to a diagonal, but what still outlines would
+    lose by more than 1/256 px is cut in float64 before.
+    """
+    diagonal = ULP * math.hypot(*size)
+    return SNAP if subject in RASTERS else 1.5 * diagonal + min((RAY_ROUNDINGS - 3.0) * diagonal, _CUT_PX)
+
+
+def misplaced_why(subject: str) -> str:
+    """Return in words where `misplaced_px` is from."""
+    if subject in RASTERS:
+        return "vertices are snapped to 1/256 px: sqrt 2 / 512 px"
+    return (
+        f"float32 rays: 3 roundings of 2^-24 of half the picture's diagonal, and {RAY_ROUNDINGS - 3.0:g} of all of it, "
+        "but what would lose more than 1/256 px is cut in float64"
+    )
+
+
+def near_edge_scene(size: Size, gap_px: float) -> Scene:
+    """Return a white half of a picture, whose edge passes the centre of a pixel in its middle at a distance."""
+    slope = np.array([0.6, 0.8])
+    along, centre = np.array([-slope[1], slope[0]]), 0.5 * (np.array(size) % 2 == 0)
+    foot, far = centre + gap_px * slope, 2.0 * float(max(size)) + 2.0
+    corners = [foot - far * along, foot + far * along, foot - far * slope]
+    return in_pixels(size, polygon([(x, y, 0.0) for x, y in corners]))
 
 
 def triangle_scene(size: Size) -> Scene:
@@ -24,7 +57,10 @@ def triangle_scene(size: Size) -> Scene:
 
 
 def comb_scene(size: Size, teeth: int = 24) -> Scene:
-    """Return white triangles some 7 px wide from end to end of a long picture, their edges across its longer side."""
+    """Return white triangles some 7 px wide from end to end of a long picture, their edges across its longer side.
+
+    Edges of some lean against rows or columns of centres by less and less, down to a thousandth of a pixel.
+    """
     x, y = size
     long, short = max(x, y), min(x, y)
     shapes = []
@@ -32,6 +68,9 @@ def comb_scene(size: Size, teeth: int = 24) -> Scene:
         # over the whole length, the first and the last one at its ends, at other places within a pixel each
         along = 3.5 + (long - 8.0) * number / (teeth - 1) + 0.618 * number % 1.0 - long / 2
         points = [(along - 3.1, -0.45 * short), (along + 4.2, -0.38 * short), (along + 0.7, 0.47 * short)]
+        if number % 2:
+            lean, middle = 0.618 * 4.0 ** -(number // 2 * 5 % 12), math.floor(along) + 0.5
+            points[1:] = [(middle + lean, -0.38 * short), (middle - lean, 0.47 * short)]
         shapes.append(polygon([(a, b, 0.0) if x == long else (b, a, 0.0) for a, b in points]))
     return in_pixels(size, *shapes)
 

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from aliasbench.bench.hard import empty, flat_signals, late_frames, refusals, sizes, texel_counts, triangles
-from aliasbench.bench.hard.case import EGL, METRICS, RASTERS, REFERENCE, TRACER
+from aliasbench.bench.hard.case import EGL, METRICS, RASTERS, REFERENCE, RENDERERS, TRACER
 from aliasbench.metrics.catalog import METRICS as ALL_METRICS
 from aliasbench.metrics.score import Score
 from aliasbench.renderers import catalog
@@ -17,7 +17,15 @@ from aliasbench.renderers.frame import Frame
 
 CASES = {case.name: case for case in sizes.CASES}
 # All else is exact. Vertices on 1/256 px; places within a texel of 16384 have 10 of 24 bits left.
-LIMITS = {(name, subject) for name in ("small-pictures", "wide-pictures", "filtered-texels") for subject in RASTERS}
+LIMITS = {
+    (name, subject)
+    for subjects, names in (
+        (RASTERS, ("filtered-texels", "late-turns", "latest-flight")),
+        (RENDERERS, ("small-pictures", "wide-pictures")),
+    )
+    for name in names
+    for subject in subjects
+}
 Bend = Callable[[NDArray[Any]], NDArray[Any]]
 
 
