@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from aliasbench.bench.hard.case import TRACERS, HardCase, Verdict, with_keys
+from aliasbench.bench.hard.case import REFERENCE, TRACERS, HardCase, Verdict, with_keys
 from aliasbench.bench.hard.panels import gray, halved, panel, picture
 from aliasbench.renderers.catalog import prepare, render
 from aliasbench.scenes.model import FloatArray, Scene
@@ -85,6 +85,11 @@ def _picture_means(subject: str, keys: str) -> tuple[FloatArray, float]:
 
 def _dot_bias(subject: str, kind: str) -> Verdict:
     """The bias of the mean of pixels with a dot, whose area is 1/4096."""
+    if subject == REFERENCE:
+        frame = render(dots(), subject, size=_DOTS)
+        bound = (frame.uncertainty or 0.0) + 64.0 * 2.0**-53  # of corners up to 32 px, twice
+        error = float(np.abs(frame.pixels - _DOT**2).max())
+        return Verdict(error, "contrast", bound, bound, "the bound that the reference states: every pixel is 1/4096")
     means, samples = _picture_means(subject, f"adaptive={kind}")
     area, rest = _DOT**2, _MOST - _LEAST
     error = float(means.std(ddof=1)) / math.sqrt(len(means))
@@ -134,12 +139,14 @@ def _variance_of_large_values(subject: str) -> Verdict:
     )
 
 
+_ONLY = "Only tracers are adaptive."
+
 CASES = (
     HardCase(
         "flat-needs-no-more",
         "values",
         "Adaptive sampling to a tolerance of 1e-30 sees flat colours of .1, 1e6 and 1e-6, plain or from a texture.",
-        "Every pixel stops at min_spp, its variance exactly 0, and has the colour's nearest float32.",
+        f"Every pixel stops at min_spp, its variance exactly 0, and has the colour's nearest float32. {_ONLY}",
         _flat_pixels,
         TRACERS,
     ),
@@ -147,7 +154,7 @@ CASES = (
         "tolerance-out-of-reach",
         "values",
         "Adaptive sampling to a tolerance of 1e-30 sees pixels that are half white.",
-        "Every pixel gets max_spp samples.",
+        f"Every pixel gets max_spp samples. {_ONLY}",
         _out_of_reach,
         TRACERS,
     ),
@@ -155,7 +162,7 @@ CASES = (
         "dot-missed-by-pooled-pilots",
         "values",
         "Each pixel holds a dot of 1/64 pixel, which the four samples of a pooled pilot miss in 999 of 1000 pixels.",
-        "The mean is too dark by no more than the pixels that stop with their pilots.",
+        f"The mean is too dark by no more than the pixels that stop with their pilots. {_ONLY}",
         _pooled_dots,
         TRACERS,
     ),
@@ -163,15 +170,16 @@ CASES = (
         "dot-missed-by-unbiased-pilots",
         "values",
         "Each pixel holds a dot of 1/64 pixel, which the four samples of a pilot miss in 999 of 1000 pixels.",
-        "Unbiased allocation keeps the mean, within its standard error over 64 seeds.",
+        "Unbiased allocation keeps the mean, within its standard error over 64 seeds; the reference has it in every "
+        f"pixel. {_ONLY}",
         _unbiased_dots,
-        TRACERS,
+        (*TRACERS, REFERENCE),
     ),
     HardCase(
         "variance-beside-a-large-mean",
         "values",
         "Half of a pixel is 2^20 and half 2^20 + 1/8: the square of the mean is 3e14 times the variance.",
-        "Adaptive sampling takes as many samples as that variance asks for.",
+        f"Adaptive sampling takes as many samples as that variance asks for. {_ONLY}",
         _variance_of_large_values,
         TRACERS,
     ),

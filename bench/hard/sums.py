@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from aliasbench.bench.hard.case import RENDERERS, TRACERS, HardCase, Verdict, samples_key
+from aliasbench.bench.hard.case import REFERENCE, RENDERERS, TRACERS, HardCase, Verdict, samples_key
 from aliasbench.bench.hard.panels import HALF_ULP, gray, is_raster, panel, picture, sampled
 from aliasbench.renderers.catalog import render
 from aliasbench.scenes.model import FloatArray, Motion, Scene
@@ -57,8 +57,19 @@ def _stratified_error(side: int) -> float:
     return math.sqrt(float((covered * (1.0 - covered)).sum())) / side**2
 
 
+def _exact_coverage(scenes: list[Scene]) -> Verdict:
+    """Return the verdict on the reference's .3 of each scene."""
+    frames = [render(scene, REFERENCE, size=(1, 1)) for scene in scenes]
+    # corners of some 10 px, of which a float64 area loses 16 roundings
+    bound = max(frame.uncertainty or 0.0 for frame in frames) + 16.0 * 100.0 * 2.0**-53
+    error = max(abs(float(frame.pixels[0, 0, 0]) - 0.3) for frame in frames)
+    return Verdict(error, "contrast", bound, bound, "the bound that the reference states, beside .3 in float64")
+
+
 def _stratified_coverage(subject: str) -> Verdict:
     """The error of an edge's coverage by very many stratified samples."""
+    if subject == REFERENCE:
+        return _exact_coverage([_slanted()])
     side = _SIDE_RASTER if is_raster(subject) else _SIDE
     error = _stratified_error(side)
     got = _red(_slanted(), sampled(subject, side * side, more="sampler=jittered"))
@@ -82,6 +93,8 @@ def _independent_coverage(subject: str) -> Verdict:
     moving = picture(
         [panel(-9.0, 0.0625, -0.2, 9.0, (1, 1), gray(1.0), Motion(velocity=(1.0, 0.0, 0.0)))], (1, 1), shutter=1.0
     )
+    if subject == REFERENCE:
+        return _exact_coverage([_slanted(), moving])
     missed = [
         abs(_red(scene, samples_key(subject, _MILLION, "sampler=random")) - 0.3) for scene in (_slanted(), moving)
     ]
@@ -101,7 +114,7 @@ CASES = (
         "flat-after-a-million-samples",
         "values",
         "A pixel of flat colour is the mean of 2^20 samples, or 2^14 passes.",
-        "It is that colour, to float32's rounding.",
+        "It is that colour, to float32's rounding. A reference takes no samples.",
         _flat_sums,
         RENDERERS,
     ),
@@ -109,16 +122,16 @@ CASES = (
         "edge-after-a-million-samples",
         "values",
         "A slanted edge covers .3 of a pixel that takes 2^20 stratified samples, or 3600 passes.",
-        "The mean is .3 within the error that stratified samples have.",
+        "The mean is .3 within the error that stratified samples have; the reference is .3 within its bound.",
         _stratified_coverage,
-        RENDERERS,
     ),
     HardCase(
         "a-million-independent-samples",
         "values",
         "An edge covers .3 of a pixel, or of pixel and open shutter as it moves, of 2^20 independent samples.",
-        "The mean is .3 within the error that independent samples have.",
+        "The mean is .3 within the error that independent samples have, the reference within its bound. A rasterizer's "
+        "passes are too few.",
         _independent_coverage,
-        TRACERS,
+        (*TRACERS, REFERENCE),
     ),
 )

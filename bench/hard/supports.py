@@ -189,7 +189,7 @@ CASES = (
         "warps-of-0-and-1",
         "values",
         "Filter distributions are drawn from points on the border of the unit square: 0, the least float, 1 - ulp, 1.",
-        "Every offset is finite and under the filter.",
+        "Every offset is finite and under the filter. A reference draws no places.",
         _warp_ends,
         RENDERERS,
     ),

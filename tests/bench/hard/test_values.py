@@ -113,9 +113,16 @@ def test_a_brighter_picture_fails(name: str, monkeypatch: pytest.MonkeyPatch) ->
 
 
 @pytest.mark.parametrize("subject", [EGL, REFERENCE])
-@pytest.mark.parametrize("name", ["dark-beside-a-sun", "largest-colours"])
+@pytest.mark.parametrize("name", ["dark-beside-a-sun", "largest-colours", "edge-after-a-million-samples"])
 def test_a_brighter_picture_fails_for_others(name: str, subject: str, monkeypatch: pytest.MonkeyPatch) -> None:
     assert outcomes(name, monkeypatch, lambda pixels: 1.02 * pixels + 0.02, subject)[1] == "failed"
+
+
+@pytest.mark.parametrize(
+    "name", ["dot-missed-by-unbiased-pilots", "a-million-independent-samples", "colours-beyond-float32"]
+)
+def test_a_brighter_reference_fails(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert outcomes(name, monkeypatch, lambda pixels: 1.0001 * pixels, REFERENCE) == ("ok", "failed")
 
 
 @pytest.mark.parametrize("name", ["flat-after-a-million-samples", "flat-under-any-filter", "largest-colours"])
