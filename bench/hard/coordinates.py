@@ -1,5 +1,7 @@
 """Texture coordinates far from 0: numbers with few bits left for parts of a texel, and repeats without end."""
 
+import itertools
+
 import numpy as np
 
 from aliasbench.bench.hard.case import RASTERS, REFERENCE, HardCase, Verdict, with_keys
@@ -18,6 +20,7 @@ from aliasbench.bench.hard.footprints import (
     modes_of,
     sheet,
 )
+from aliasbench.bench.hard.placing import moved
 from aliasbench.bench.hard.texel_areas import areas_verdict
 from aliasbench.renderers.catalog import render
 
@@ -36,9 +39,11 @@ def _far_coordinates(subject: str) -> Verdict:
     worst, note = 0.0, "no wrong texel"
     for name in TEXELS:
         for offset in (1e4, -1e6, 1e8):
-            for lean in LEANS:
-                found = misplaced(subject, sheet(name, 0.25, offset=offset / TEXELS[name], lean=lean))
-                worst, note = max((worst, note), (found, f"worst: {name}, {offset:g} texels from 0"))
+            for lean, projection in itertools.product(LEANS, ("orthographic", "perspective")):
+                still = sheet(name, 0.25, offset=offset / TEXELS[name], lean=lean, projection=projection)
+                for scene in (still, moved(still)):
+                    at = f"worst: {name}, {offset:g} texels from 0, {projection}{'' if scene is still else ', turning'}"
+                    worst, note = max((worst, note), (misplaced(subject, scene), at))
     bound, why = coordinate_bound_px(subject, 34.0)
     if subject not in RASTERS:
         bound += 16.0 * 2.0**-53 * 1e8 / 0.25
@@ -104,7 +109,7 @@ CASES = (
     HardCase(
         "coordinates-far-point",
         "scale",
-        "Texture coordinates 1e4, -1e6 and 1e8 texels from 0.",
+        "Texture coordinates 1e4, -1e6 and 1e8 texels from 0, on sheets still and turning, before either camera.",
         f"{TEXELS_OWN}.",
         _far_coordinates,
     ),

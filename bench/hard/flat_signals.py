@@ -204,7 +204,7 @@ CASES = (
     HardCase(
         "flat-pictures",
         "sizes",
-        "Constant pictures against constant references: all black, all white, grey, an offset, the opposite.",
+        "Constant pictures against constant references, made by hand: black, white, grey, an offset, the opposite.",
         "Every metric has the value or the reason that a constant error has in closed form.",
         _flat,
         (METRICS,),
@@ -212,7 +212,7 @@ CASES = (
     HardCase(
         "no-contrast",
         "sizes",
-        "Scenes built in Python whose contrast is 0, negative, infinite or no number.",
+        "Pictures made by hand of scenes whose contrast is 0, negative, infinite or no number.",
         "Every metric is undefined_zero_contrast, for equal pictures too.",
         _no_contrast,
         (METRICS,),
@@ -220,7 +220,7 @@ CASES = (
     HardCase(
         "pictures-with-no-numbers",
         "sizes",
-        "Two values of a sequence are NaN or infinite, in the picture or in its reference.",
+        "Two values of a sequence made by hand are NaN or infinite, in the picture or in its reference.",
         "Every metric is nonfinite with their count and the first one's place; the reference is an error.",
         _no_number,
         (METRICS,),
@@ -228,7 +228,7 @@ CASES = (
     HardCase(
         "pictures-too-small-to-measure",
         "sizes",
-        "Sequences of 1 x 1 to 9 x 9 pixels, with and without a border that is cut off.",
+        "Sequences of 1 x 1 to 9 x 9 random pixels, made by hand, with and without a border that is cut off.",
         "No metric breaks: a value, or undefined_too_small; the RMS error is that of the pixels that are left.",
         _small,
         (METRICS,),

@@ -303,7 +303,7 @@ CASES = (
     HardCase(
         "files-with-no-numbers",
         "sizes",
-        "OBJ, PLY, glTF, EXR and scene files with nan and inf, contrasts of 0 and below, meshes without a face.",
+        "Files (OBJ, PLY, glTF, EXR, scenes) before any renderer: nan, inf, contrasts of 0 and below, no faces.",
         "Each is refused by InputError, in one sentence that names the file, the place and what is wrong.",
         _files,
         (METRICS,),
