@@ -81,15 +81,16 @@ class Shutter:
 def layer_matrix(view: View, layer: int, layer_depth: float, anchor: FloatArray) -> FloatArray:
     """Return the (4, 4) matrix that brings points (relative to `anchor`) k layers nearer without moving their image.
 
-    Perspective scales about the eye; parallel rays are followed backwards by a share of `layer_depth`.
+    Perspective scales about the eye, where `layer_depth` is a factor; parallel rays are followed backwards by a share
+    of it.
     """
     out = np.eye(4)
-    step = layer * LAYER_STEP
+    step = layer * LAYER_STEP * layer_depth
     if view.perspective:
         out[:3, :3] *= 1.0 - step
         out[:3, 3] = step * (view.origin - anchor)
     else:
-        out[:3, 3] = -step * layer_depth * view.forward
+        out[:3, 3] = -step * view.forward
     return out
 
 
@@ -114,7 +115,7 @@ def body_values(scene: Scene, body: Body, shutter: Shutter, anchor: FloatArray) 
         out[SHIFT : SHIFT + 3] = pivot_ends[0]
         out[SHIFT_TRAVEL : SHIFT_TRAVEL + 3] = pivot_ends[1] - pivot_ends[0]
         if shutter.first.perspective:
-            out[INVERSE_SCALE] = 1.0 / (1.0 - body.layer * LAYER_STEP)
+            out[INVERSE_SCALE] = 1.0 / (1.0 - body.layer * LAYER_STEP * shutter.layer_depth)
         out[PIVOT : PIVOT + 3] = body.origin - pivot
     else:
         out[KIND] = LINEAR
@@ -240,12 +241,12 @@ def lane_to_body(values: FloatArray, scratch: FloatArray, i: int) -> None:
 
 
 @inlined
-def fill_body_rays(scratch: FloatArray, ray: NDArray[np.float32], body_ray: NDArray[np.float32]) -> None:
-    """Write the rays in the body's frame as Embree takes them, ending where the packet's nearest hits are."""
+def fill_body_rays(scratch: FloatArray, ray: NDArray[np.float32], body_ray: NDArray[np.float32], start: float) -> None:
+    """Write the rays in the body's frame as Embree takes them, from a depth on, to the packet's nearest hits."""
     for i in range(LANES):
-        body_ray[RAY_OX + i] = np.float32(scratch[LX + i])
-        body_ray[RAY_OY + i] = np.float32(scratch[LY + i])
-        body_ray[RAY_OZ + i] = np.float32(scratch[LZ + i])
+        body_ray[RAY_OX + i] = np.float32(scratch[LX + i] + start * scratch[MX + i])
+        body_ray[RAY_OY + i] = np.float32(scratch[LY + i] + start * scratch[MY + i])
+        body_ray[RAY_OZ + i] = np.float32(scratch[LZ + i] + start * scratch[MZ + i])
         body_ray[RAY_DX + i] = np.float32(scratch[MX + i])
         body_ray[RAY_DY + i] = np.float32(scratch[MY + i])
         body_ray[RAY_DZ + i] = np.float32(scratch[MZ + i])

@@ -13,6 +13,7 @@ import numpy as np
 
 from aliasbench.renderers.geometry import Body
 from aliasbench.renderers.raytrace.bodies import Shutter
+from aliasbench.renderers.raytrace.start import Spheres, find_start
 from aliasbench.renderers.technique import Technique
 from aliasbench.scenes.model import FloatArray, Scene
 from aliasbench.scenes.projection import View, view_at
@@ -37,8 +38,10 @@ class Exposure:
         Bodies of the merged mesh, and those that are traced in their own frame.
     has_times : bool
         Whether samples at different times may differ (or bodies are traced in their frames).
-    mesh_key : tuple of int
+    mesh_key : tuple of float
         Equal for frames with the same merged mesh.
+    start : float
+        The depth at which rays start, see `start`.
     """
 
     shutter: Shutter
@@ -48,32 +51,36 @@ class Exposure:
     still: tuple[Body, ...]
     moving: tuple[Body, ...]
     has_times: bool
-    mesh_key: tuple[int, ...]
+    mesh_key: tuple[float, ...]
+    start: float
 
 
 def plan_exposure(
-    scene: Scene, technique: Technique, size: tuple[int, int], bodies: Sequence[Body], frame: int
+    scene: Scene, technique: Technique, size: tuple[int, int], bodies: Sequence[Body], spheres: Spheres, frame: int
 ) -> Exposure:
     """Return what frame number `frame` is made from; a function of the frame alone, not of what came before."""
     opening, closing = shutter_interval(scene, technique)
     first = view_at(scene.camera, scene.animation, frame, opening, size)
     last = view_at(scene.camera, scene.animation, frame, closing, size) if closing > opening else first
-    anchor_frame = _anchor_frame(scene, frame)
+    start, share = find_start(spheres, scene, (first, last), frame)
+    anchor_frame = _anchor_frame(scene, frame) if start == 0.0 or scene.camera.is_static else frame
     anchor_view = view_at(scene.camera, scene.animation, anchor_frame, 0.0, size)
-    anchor, travel = anchor_view.origin, 0.0 if not any(scene.camera.velocity) else _reach(scene)
-    depth = _layer_depth(bodies, first, travel)
+    anchor = anchor_view.origin + start * anchor_view.forward
+    travel = 0.0 if not any(scene.camera.velocity) else _reach(scene)
+    depth = _layer_depth(bodies, first, travel, start, share)
     is_matrix = technique.motion == "matrix"
     shutter = Shutter(frame, opening, closing, first, last, depth, scene.camera.lens_radius, is_matrix)
     # A layer above others is brought towards the eye, and so moves with it.
     apart = [not b.motion.is_static or (b.layer > 0 and not scene.camera.is_static) for b in bodies]
     restless = [b for b, is_apart in zip(bodies, apart, strict=True) if is_apart]
     if opening == closing and sum(len(b.triangles) for b in restless) <= MERGE_LIMIT:
-        key = (anchor_frame, frame) if restless else (anchor_frame,)
-        return Exposure(shutter, anchor, anchor_view, travel, tuple(bodies), (), has_times=False, mesh_key=key)
+        key = (anchor_frame, start, frame) if restless else (anchor_frame, start)
+        return Exposure(shutter, anchor, anchor_view, travel, tuple(bodies), (), False, key, start)
     still = tuple(b for b, is_apart in zip(bodies, apart, strict=True) if not is_apart)
     camera_moves = closing > opening and not scene.camera.is_static
     has_times = bool(restless) or camera_moves
-    return Exposure(shutter, anchor, anchor_view, travel, still, tuple(restless), has_times, (anchor_frame,))
+    key = (anchor_frame, start)
+    return Exposure(shutter, anchor, anchor_view, travel, still, tuple(restless), has_times, key, start)
 
 
 def shutter_interval(scene: Scene, technique: Technique) -> tuple[float, float]:
@@ -105,14 +112,14 @@ def _reach(scene: Scene) -> float:
     return float(np.linalg.norm(np.subtract(scene.camera.target, scene.camera.position)))
 
 
-def _layer_depth(bodies: Sequence[Body], view: View, travel: float) -> float:
+def _layer_depth(bodies: Sequence[Body], view: View, travel: float, start: float, share: float) -> float:
     """Return the distance that layers under parallel rays are a share of: the greatest depth, or half width of what
-    can be seen, of anything with a layer at rest.
+    can be seen, of anything with a layer at rest; for a pinhole the `share` of the reach that rays do go.
 
     What of it is out of sight does not count, or a sheet that reaches far out would be brought behind the camera.
     """
     if view.perspective:
-        return 1.0
+        return share
     wide = _WIDEST * (max(view.width, view.height) / view.scale + travel)
     far = 0.0
     for body in bodies:
@@ -122,6 +129,6 @@ def _layer_depth(bodies: Sequence[Body], view: View, travel: float) -> float:
         normal = np.cross(place[:, 1] - place[:, 0], place[:, 2] - place[:, 0])
         with np.errstate(divide="ignore", invalid="ignore"):
             seen = np.abs((normal * place[:, 0]).sum(axis=1)) + wide * np.abs(normal[:, :2]).sum(axis=1)
-            depth = np.fmin(seen / np.abs(normal[:, 2]), np.abs(place[..., 2]).max(axis=1))
+            depth = np.fmin(seen / np.abs(normal[:, 2]), np.abs(place[..., 2]).max(axis=1)) - start
         far = max(far, float(depth.max()), min(wide, float(np.abs(place[..., :2]).max())))
     return far or 1.0

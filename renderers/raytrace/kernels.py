@@ -27,6 +27,7 @@ from aliasbench.renderers.raytrace.lanes import (
     LANES,
     LENS_RADIUS,
     RAY_TFAR,
+    START,
     camera_moves,
     fill_changing_rays,
     fill_moving_rays,
@@ -127,14 +128,18 @@ def trace(scene: int, work: Workspace, lanes: int) -> None:
 
 @inlined
 def trace_bodies(
-    scenes: CountArray, tables: Tables, work: Workspace, left: float, right: float, top: float, bottom: float
-) -> None:
-    """Find nearer hits on the bodies that move and may be seen there in the picture, each in its own frame."""
+    scenes: CountArray, tables: Tables, start: float, work: Workspace,
+    left: float, right: float, top: float, bottom: float,
+) -> None:  # fmt: skip
+    """Find nearer hits on the bodies that move and may be seen there in the picture, each in its own frame.
+
+    `start` is the depth at which the rays start.
+    """
     for body in range(len(scenes)):
         if not may_see(tables.bodies[body], left, right, top, bottom):
             continue
         to_body(tables.bodies[body], work.scratch)
-        fill_body_rays(work.scratch, work.ray, work.body_ray)
+        fill_body_rays(work.scratch, work.ray, work.body_ray, start)
         for i in range(LANES):
             work.body_ids[HIT_GEOM + i] = NOTHING
             work.body_ids[HIT_INSTANCE + i] = NOTHING
@@ -158,7 +163,7 @@ def _trace_block(
         take_sorted(work.block, p, lanes, work.scratch)
         fill_moving_rays(camera, work.scratch, work.ray)
         trace(scene, work, lanes)
-        trace_bodies(scenes, tables, work, *picture_reach(work.scratch, lanes))
+        trace_bodies(scenes, tables, camera[START], work, *picture_reach(work.scratch, lanes))
         if textured:
             shade_textured(tables, camera, work.hits, work.scratch)
         else:

@@ -36,7 +36,8 @@ RAY_SIZE = 384
 EYE, EYE_TRAVEL, AXIS, AXIS_TRAVEL, UP_HINT, RIGHT, UP, FORWARD = 0, 3, 6, 9, 12, 15, 18, 21
 SCALE, PERSPECTIVE, CENTER_X, CENTER_Y, TURNING = 24, 25, 26, 27, 28
 LENS_RADIUS, FOCUS = 29, 30  # a focus of 0 is the distance of the target, at any time
-CAMERA_SIZE = 31
+START = 31  # the depth at which rays start
+CAMERA_SIZE = 32
 
 
 @called
@@ -54,6 +55,14 @@ def write_ray(
     ray[RAY_DX + i], ray[RAY_DY + i], ray[RAY_DZ + i] = np.float32(dx), np.float32(dy), np.float32(dz)
 
 
+@called
+def _start_ahead(depth: float, scratch: FloatArray, ray: NDArray[np.float32]) -> None:
+    """Have the rays of all lanes start at a depth, to which they are followed in float64."""
+    for k in range(0, 3 * LANES, LANES):
+        for i in range(LANES):
+            ray[RAY_OX + k + i] = np.float32(scratch[OX + k + i] + depth * scratch[DX + k + i])
+
+
 @inlined
 def fill_rays(camera: FloatArray, scratch: FloatArray, ray: NDArray[np.float32]) -> None:
     """Write the rays of all 16 lanes through their image positions, for a camera that stands still."""
@@ -68,6 +77,8 @@ def fill_rays(camera: FloatArray, scratch: FloatArray, ray: NDArray[np.float32])
         b = (cy - scratch[PY + i]) * step
         px, py, pz = a * rx + b * ux, a * ry + b * uy, a * rz + b * uz
         write_ray(scratch, ray, i, perspective, ex, ey, ez, px, py, pz, fx, fy, fz)
+    if camera[START] > 0.0:
+        _start_ahead(camera[START], scratch, ray)
 
 
 @called
@@ -88,6 +99,8 @@ def fill_changing_rays(camera: FloatArray, scratch: FloatArray, ray: NDArray[np.
         _fill_rows(camera, scratch, ray, DX, RAY_DX, FORWARD)
     else:
         _fill_rows(camera, scratch, ray, OX, RAY_OX, EYE)
+    if camera[START] > 0.0:
+        _start_ahead(camera[START], scratch, ray)
 
 
 # With the rows known before it is optimised, which `inlined` would not do: 4 % of a picture's time.
@@ -167,6 +180,8 @@ def fill_moving_rays(camera: FloatArray, scratch: FloatArray, ray: NDArray[np.fl
             )  # fmt: skip
         else:
             write_ray(scratch, ray, i, perspective, ex, ey, ez, px, py, pz, fx, fy, fz)
+    if camera[START] > 0.0:
+        _start_ahead(camera[START], scratch, ray)
 
 
 def aligned_floats(count: int) -> NDArray[np.float32]:

@@ -23,6 +23,7 @@ from aliasbench.renderers.raytrace.lanes import (
     LANES,
     LENS_RADIUS,
     RAY_TFAR,
+    START,
     fill_moving_rays,
     fill_rays,
 )
@@ -63,7 +64,7 @@ def _trace_paths(scene: int, scenes: CountArray, tables: Tables, paths: Paths, w
     work.arguments[0] = 0  # of paths that have been scattered, hardly two go the same way
     if scene != EMPTY:
         intersect16(work.valid.ctypes.data, scene, work.ray.ctypes.data, work.arguments.ctypes.data)
-    trace_bodies(scenes, tables, work, -np.inf, np.inf, -np.inf, np.inf)
+    trace_bodies(scenes, tables, 0.0, work, -np.inf, np.inf, -np.inf, np.inf)
     work.arguments[0] = _COHERENT
 
 
@@ -74,7 +75,7 @@ def _trace_shadows(scene: int, scenes: CountArray, tables: Tables, shadow: Works
         _occluded16(shadow.valid.ctypes.data, scene, shadow.ray.ctypes.data, shadow.arguments.ctypes.data)
     for body in range(len(scenes)):
         to_body(tables.bodies[body], shadow.scratch)
-        fill_body_rays(shadow.scratch, shadow.ray, shadow.body_ray)
+        fill_body_rays(shadow.scratch, shadow.ray, shadow.body_ray, 0.0)
         _occluded16(shadow.valid.ctypes.data, scenes[body], shadow.body_ray.ctypes.data, shadow.arguments.ctypes.data)
         for i in range(LANES):
             if shadow.body_ray[RAY_TFAR + i] < 0.0:
@@ -113,7 +114,7 @@ def film_paths(
             else:
                 fill_rays(camera, work.scratch, work.ray)
             trace(scene, work, lanes)
-            trace_bodies(scenes, tables, work, *picture_reach(work.scratch, lanes))
+            trace_bodies(scenes, tables, camera[START], work, *picture_reach(work.scratch, lanes))
             start_paths(pattern, film, work.keys, r, work.runs[0], runs, lanes, work.numbers, paths)
             for segment in range(MOST_SEGMENTS):
                 shade_textured(tables, camera, work.hits, work.scratch)

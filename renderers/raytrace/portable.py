@@ -28,6 +28,7 @@ from aliasbench.renderers.raytrace.lanes import (
     RAY_SIZE,
     RAY_TFAR,
     SCRATCH_SIZE,
+    START,
     fill_moving_rays,
     fill_rays,
 )
@@ -189,7 +190,7 @@ class PortableEngine:
             blocks = min(rows, out.shape[0] - top) * per_row
             _make_rays(camera, pattern, moving, top, keys, orders, numbers, scratch[:blocks], rays[:blocks])
             nearest = np.full(blocks * LANES, np.inf, np.float32)
-            hits = self._trace(tables, camera, scratch[:blocks], rays[:blocks], nearest)
+            hits = self._trace(tables, camera, scratch[:blocks], rays[:blocks], nearest, camera[START])
             _shade(camera, pattern, tables, top, hits, scratch[:blocks], sums, out)
             if progress is not None:
                 progress(min(top + rows, len(out)) / len(out))
@@ -207,7 +208,7 @@ class PortableEngine:
         self._check_open()
         room = FilmRoom(camera, pattern, tables, moving, film, _BATCH)
         while (batch := room.next_batch()) is not None:
-            batch.hits[:] = self._trace(tables, camera, batch.scratch, batch.rays, batch.ends())
+            batch.hits[:] = self._trace(tables, camera, batch.scratch, batch.rays, batch.ends(), camera[START])
             if scattering is None:
                 batch.shade()
             else:
@@ -238,16 +239,22 @@ class PortableEngine:
         batch.show_paths()
 
     def _trace(
-        self, tables: Tables, camera: FloatArray, scratch: FloatArray, rays: RayArray, nearest: RayArray
+        self,
+        tables: Tables,
+        camera: FloatArray,
+        scratch: FloatArray,
+        rays: RayArray,
+        nearest: RayArray,
+        start: float = 0.0,
     ) -> NDArray[np.int32]:
-        """Return the triangles hit before the distances `nearest` (n,), (blocks, LANES)."""
+        """Return the triangles hit before the distances `nearest` (n,) by rays from a depth on, (blocks, LANES)."""
         hits = np.full(nearest.shape, MISS, np.int32)
         search = _Search(tables, camera, scratch, nearest, hits)
         if self._still is not None:
             search.look(self._still, rays, 0)
         for index, body in enumerate(self._bodies):
             own = rays.copy()
-            _make_body_rays(tables.bodies[index], scratch, own)
+            _make_body_rays(tables.bodies[index], scratch, own, start)
             search.look(body, own, int(tables.firsts[index]))
         return hits.reshape(-1, LANES)
 
@@ -288,10 +295,10 @@ def _make_rays(
 
 
 @njit(cache=True, error_model="numpy", _nrt=False)
-def _make_body_rays(values: FloatArray, scratch: FloatArray, rays: RayArray) -> None:
+def _make_body_rays(values: FloatArray, scratch: FloatArray, rays: RayArray, start: float) -> None:
     for block in range(len(scratch)):
         to_body(values, scratch[block])
-        fill_body_rays(scratch[block], rays[block], rays[block])
+        fill_body_rays(scratch[block], rays[block], rays[block], start)
 
 
 @njit(cache=True, error_model="numpy", _nrt=False)

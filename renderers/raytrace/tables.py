@@ -22,6 +22,7 @@ from aliasbench.renderers.raytrace.lanes import (
     PERSPECTIVE,
     RIGHT,
     SCALE,
+    START,
     TURNING,
     UP,
     UP_HINT,
@@ -107,8 +108,8 @@ def merge_bodies(scene: Scene, looks: "Looks", bodies: Sequence[Body], shutter: 
     )
 
 
-def camera_values(scene: Scene, shutter: Shutter, anchor: FloatArray) -> FloatArray:
-    """Return the (CAMERA_SIZE,) values of the camera over one exposure."""
+def camera_values(scene: Scene, shutter: Shutter, anchor: FloatArray, start: float) -> FloatArray:
+    """Return the (CAMERA_SIZE,) values of the camera over one exposure, its rays starting at a depth."""
     out = np.zeros(CAMERA_SIZE)
     first, last, camera = shutter.first, shutter.last, scene.camera
     out[EYE : EYE + 3] = first.origin - anchor
@@ -124,6 +125,7 @@ def camera_values(scene: Scene, shutter: Shutter, anchor: FloatArray) -> FloatAr
     out[SCALE], out[PERSPECTIVE] = first.scale, float(first.perspective)
     out[CENTER_X], out[CENTER_Y] = first.width / 2, first.height / 2
     out[LENS_RADIUS], out[FOCUS] = camera.lens_radius, camera.focus_distance or 0.0
+    out[START] = start
     out[TURNING] = float(bool(out[AXIS_TRAVEL : AXIS_TRAVEL + 3].any()))
     return out
 

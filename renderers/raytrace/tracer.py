@@ -26,6 +26,7 @@ from aliasbench.renderers.raytrace.film import Film
 from aliasbench.renderers.raytrace.lighting import is_scattered, put_materials
 from aliasbench.renderers.raytrace.paths import Scattering
 from aliasbench.renderers.raytrace.shading import Tables
+from aliasbench.renderers.raytrace.start import Spheres
 from aliasbench.renderers.raytrace.tables import (
     Mesh,
     body_mesh,
@@ -156,6 +157,7 @@ class PreparedRaytrace:
         "_scene",
         "_setup_seconds",
         "_size",
+        "_spheres",
         "_still",
         "_technique",
         "_whole",
@@ -174,14 +176,15 @@ class PreparedRaytrace:
         put_materials(scene, self._looks.objects)
         self._placed = self._looks.textured or self._is_scattered
         self._footprint = float(technique.shading_samples) ** -0.5
-        self._mesh_key: tuple[int, ...] = ()
+        self._mesh_key: tuple[float, ...] = ()
         self._hidden = np.zeros(0, np.int64)
         self._still = self._moving = build_ownership((), placed=False)
         self._optics = make_optics(technique, size[0])
         self._room = Room()
         has_lens = scene.camera.lens_radius > 0.0
         self._is_plain = is_plain(technique, self._optics) and not has_lens and not self._is_scattered
-        exposure = plan_exposure(scene, technique, size, self._bodies, 0)
+        self._spheres = Spheres.about(self._bodies)
+        exposure = plan_exposure(scene, technique, size, self._bodies, self._spheres, 0)
         meshes = [body_mesh(body, self._looks) for body in exposure.moving]
         engine.set_moving(meshes)
         self._moving = build_ownership(meshes, placed=self._placed)
@@ -198,7 +201,7 @@ class PreparedRaytrace:
         """
         started = time.perf_counter()
         technique = self._technique
-        exposure = plan_exposure(self._scene, technique, self._size, self._bodies, frame)
+        exposure = plan_exposure(self._scene, technique, self._size, self._bodies, self._spheres, frame)
         self._place(exposure)
         start = frame_key(seed, pattern_frame(technique.reseed, frame))
         pixels, counts = self._expose(exposure, start, progress)
@@ -247,7 +250,7 @@ class PreparedRaytrace:
             values[:] = body_values(scene, body, shutter, anchor)
         lights = light_values(scene, shutter.first, anchor)
         tables = build_tables(scene, self._looks, self._still, self._moving, bodies, lights, self._footprint)
-        camera = camera_values(scene, shutter, anchor)
+        camera = camera_values(scene, shutter, anchor, exposure.start)
         is_adaptive = t.adaptive != "off"
         pattern = make_pattern(
             t.sampler,
