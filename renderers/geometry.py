@@ -7,9 +7,11 @@ Two needs meet here, once for both renderers:
 * Of coplanar surfaces the later object wins. An engine that keeps the nearest hit cannot know that, so every object has
   a `layer`, 0 for most, higher where it lies in the plane of an earlier object that it may overlap; layer k is brought
   towards the eye by k * LAYER_STEP of its distance. Scaling about the eye (or sliding along an orthographic axis) moves
-  no point of the picture, so only the order changes.
+  no point of the picture, so only the order changes. Where rays graze the plane, what is known of a depth is less by
+  the depth's ratio to the eye's height above the plane: by k * LAYER_TILT times that ratio it is brought nearer still.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,10 +19,14 @@ from numpy.typing import NDArray
 
 from aliasbench.scenes.errors import UnsupportedScene
 from aliasbench.scenes.model import FloatArray, Motion, Scene, Surface
+from aliasbench.scenes.projection import View
 
 # Relative step between layers: some 60 ulp of float32, well over the rounding of a ray-plane hit (a few ulp) and far
 # below anything a scene means by two different planes.
 LAYER_STEP = 2.0**-18
+# The same for two planes whose corners, at most 8 times as far away as a hit, are rounded by half an ulp each.
+LAYER_TILT = 2.0**-18
+_WIDEST = 4.0  # pictures: what of a layered surface is farther out of sight does not count
 MOST_LAYERS = 4096  # together 1.6 % of the distance; beyond, more and more would be brought before what is nearer
 _AT_ONCE = 64  # outlines that are cut with another at a time
 _PLANE_TOLERANCE = 1e-7  # two planes closer than this (relative to the scene) are one
@@ -43,6 +49,8 @@ class Body:
         Zero where a surface has none.
     surfaces : (m,) int32
         For each triangle the index of its object in `scene.objects`.
+    plane : (4,) float64
+        (n, k) of the plane n . x = k that all vertices of a layer above 0 lie in, relative to `origin`; else zeros.
     """
 
     motion: Motion
@@ -52,6 +60,7 @@ class Body:
     triangles: NDArray[np.int32]
     uv: FloatArray
     surfaces: NDArray[np.int32]
+    plane: FloatArray
 
     def local_matrix(self, world: FloatArray, eye: FloatArray) -> FloatArray:
         """Return the (4, 4) float64 matrix from body vertices to the world relative to `eye`.
@@ -64,18 +73,23 @@ class Body:
 
 
 def build_bodies(scene: Scene) -> tuple[Body, ...]:
-    """Return the scene's triangles grouped by (motion, layer), in the order of first appearance."""
-    layers = coplanar_layers(scene)
-    groups: dict[tuple[Motion, int], list[int]] = {}
+    """Return the scene's triangles grouped by motion, layer and, above layer 0, plane, as they first appear."""
+    layers, planes = _stack_planes(scene)
+    groups: dict[tuple[Motion, int, int], list[int]] = {}
     for index, surface in enumerate(scene.objects):
-        groups.setdefault((_effective(surface.motion), int(layers[index])), []).append(index)
-    return tuple(_build_body(scene, motion, layer, members) for (motion, layer), members in groups.items())
+        layer = int(layers[index])
+        groups.setdefault((_effective(surface.motion), layer, planes[index] if layer else -1), []).append(index)
+    return tuple(_build_body(scene, motion, layer, members) for (motion, layer, _), members in groups.items())
 
 
 def _build_body(scene: Scene, motion: Motion, layer: int, members: list[int]) -> Body:
     surfaces = [scene.objects[i] for i in members]
     world = np.concatenate([s.vertices for s in surfaces])
     origin = (world.min(axis=0) + world.max(axis=0)) / 2 if len(world) else np.zeros(3)
+    plane = np.zeros(4)
+    if layer:
+        normal, offset = _plane_of(surfaces[0])
+        plane = np.append(normal, offset - normal @ origin)
     starts = np.cumsum([0] + [len(s.vertices) for s in surfaces[:-1]])
     return Body(
         motion,
@@ -85,7 +99,29 @@ def _build_body(scene: Scene, motion: Motion, layer: int, members: list[int]) ->
         np.concatenate([s.triangles + start for s, start in zip(surfaces, starts, strict=True)]).astype(np.int32),
         np.concatenate([s.uv if s.uv is not None else np.zeros((len(s.vertices), 2)) for s in surfaces]),
         np.concatenate([np.full(len(s.triangles), i, np.int32) for i, s in zip(members, surfaces, strict=True)]),
+        plane,
     )
+
+
+def layered_depth(bodies: Sequence[Body], view: View, travel: float = 0.0, start: float = 0.0) -> float:
+    """Return the distance that layers under parallel rays are a share of: the greatest depth, beyond where rays start,
+    or half width of what can be seen, of anything with a layer at rest.
+
+    What of it is out of sight does not count, or a sheet that reaches far out would be brought behind the camera.
+    `travel` is how far the camera may move.
+    """
+    wide = _WIDEST * (max(view.width, view.height) / view.scale + travel)
+    far = 0.0
+    for body in bodies:
+        if not body.layer or not len(body.triangles):
+            continue
+        place = view.to_camera(body.vertices + body.origin)[body.triangles]
+        normal = np.cross(place[:, 1] - place[:, 0], place[:, 2] - place[:, 0])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            seen = np.abs((normal * place[:, 0]).sum(axis=1)) + wide * np.abs(normal[:, :2]).sum(axis=1)
+            depth = np.fmin(seen / np.abs(normal[:, 2]), np.abs(place[..., 2]).max(axis=1)) - start
+        far = max(far, float(depth.max()), min(wide, float(np.abs(place[..., :2]).max())))
+    return far or 1.0
 
 
 def coplanar_layers(scene: Scene) -> NDArray[np.int32]:
@@ -99,7 +135,13 @@ def coplanar_layers(scene: Scene) -> NDArray[np.int32]:
     UnsupportedScene
         If more than `MOST_LAYERS` lie on top of each other.
     """
+    return _stack_planes(scene)[0]
+
+
+def _stack_planes(scene: Scene) -> tuple[NDArray[np.int32], list[int]]:
+    """Return the layer of every object, and a number of its plane, -1 for meshes."""
     layers = np.zeros(len(scene.objects), np.int32)
+    numbers = [-1] * len(scene.objects)
     planes: dict[tuple[int, ...], list[int]] = {}
     extent = _scene_extent(scene)
     for index, surface in enumerate(scene.objects):
@@ -107,10 +149,12 @@ def coplanar_layers(scene: Scene) -> NDArray[np.int32]:
             normal, offset = _plane_of(surface)
             key = np.round(np.append(normal, offset / extent) / _PLANE_TOLERANCE).astype(np.int64)
             planes.setdefault(tuple(key.tolist()), []).append(index)
-    for members in planes.values():
+    for number, members in enumerate(planes.values()):
+        for index in members:
+            numbers[index] = number
         if len(members) > 1:
             layers[members] = _stack([scene.objects[i] for i in members])
-    return layers
+    return layers, numbers
 
 
 def _stack(surfaces: list[Surface]) -> NDArray[np.int32]:

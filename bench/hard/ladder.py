@@ -5,7 +5,8 @@ so that any misplacement turns samples over and its size is read off the ladder.
 units of half an ulp, 2^-24 of the distance from a ray's origin to a corner. A ray tracer rounds the corner, the ray's
 origin and its direction (3); an edge test takes a corner relative to the ray, and the edge, sum and difference of two
 such (3), their cross product (2, terms are fused) and its product with the direction (3), and compares with a tolerance
-of an ulp (1 more when that is kept by robust rays): together 12. A rasterizer snaps corners to 1/256 px, by half a step
+of an ulp (1 more when that is kept by robust rays): together 12. Where the camera is far from a small scene, rays start
+close before it, and that is the origin. A rasterizer snaps corners to 1/256 px, by half a step
 each way.
 """
 
@@ -28,6 +29,10 @@ DISTANCE_PX = 100.0  # of the camera from the ladder, in the ladder's pixels
 TURN = np.array([(4.0, -20.0, 22.0), (28.0, 10.0, 4.0), (-10.0, 20.0, 20.0)]) / 30.0
 HALF_ULP = 2.0**-24
 RAY_ROUNDINGS = 12.0
+# The diagonal of the box about the scene is the diameter of a sphere about it; what moves is a little wider, and rays
+# start up to 1/32 of the depth beyond before it.
+_AROUND, _FAR = 1.125, 8.0
+FLOAT64_ROUNDINGS = 8.0 * 2.0**-53  # of an origin, a direction, a product and a sum for each of both
 SNAPPED_PX = math.sqrt(2.0) / 512.0  # half of 1/256 px, right and down
 FRAME, _FPS, _SHUTTER = 7, 30.0, 0.5
 MIDDLE_S = (FRAME + _SHUTTER / 2) / _FPS
@@ -95,8 +100,13 @@ def ladder_scene(
 def ray_bound_px(scene: Scene, unit: float) -> float:
     """Return by how many pixels of `unit` float32 may move an edge under rays: see the module's text."""
     eye = np.asarray(scene.camera.position)
-    reach = max(float(np.linalg.norm(s.vertices - eye, axis=1).max()) for s in scene.objects)
-    return RAY_ROUNDINGS * HALF_ULP * reach / unit
+    corners = np.concatenate([s.vertices for s in scene.objects])
+    reach = float(np.linalg.norm(corners - eye, axis=1).max())
+    across = float(np.linalg.norm(np.ptp(corners, axis=0))) * _AROUND
+    if reach < _FAR * across:
+        return RAY_ROUNDINGS * HALF_ULP * reach / unit
+    # rays start close before the sphere about the scene, to where float64 has followed them
+    return (RAY_ROUNDINGS * HALF_ULP * across + FLOAT64_ROUNDINGS * reach) / unit
 
 
 def misplacement(subject: str, scene: Scene, frame: int = 0) -> float:

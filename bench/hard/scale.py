@@ -13,13 +13,15 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from aliasbench.bench.hard.case import REFERENCE, RENDERERS, HardCase, Verdict, samples_key
+from aliasbench.bench.hard.case import RASTERS, REFERENCE, RENDERERS, HardCase, Verdict, samples_key
 from aliasbench.bench.hard.ladder import (
     DISTANCE_PX,
     FAR,
     FRAME,
+    HALF_ULP,
     HERE,
     INSTANT,
+    RAY_ROUNDINGS,
     SIZE,
     TURN,
     bound_of,
@@ -156,15 +158,22 @@ _PICTURES = 130000.0
 
 
 def _far_away(subject: str) -> Verdict:
-    """The ladder seen through a telescope, or by parallel rays, from 130 000 pictures away."""
+    """The ladder seen through a telescope, or by parallel rays, from 130 000 and 10 million pictures away."""
     found: dict[str, float] = {}
     bound, why = 0.0, ""
     for projection in ("orthographic", "perspective"):
-        scene = ladder_scene(projection, distance_px=_PICTURES * SIZE[1])
-        found[projection] = misplacement(subject, scene)
-        allowed, why = bound_of(subject, scene, 1.0)
-        bound = max(bound, allowed)
+        for pictures, moving in ((_PICTURES, False), (1e7, False), (1e7, True)):
+            scene = ladder_scene(projection, distance_px=pictures * SIZE[1], moving=moving)
+            name = f"{projection} {pictures:g} {'moving' if moving else 'still'}"
+            found[name] = misplacement(subject, scene, FRAME if moving else 0)
+            allowed, why = bound_of(subject, scene, 1.0)
+            bound = max(bound, allowed)
     return placed(found, bound, why)
+
+
+# What is seen of vast strips is cut at planes about the camera no farther away than the farthest of their edges passes
+# it, and its corners are at most sqrt(3) times as far.
+_CUT_PX = RAY_ROUNDINGS * HALF_ULP * math.sqrt(3.0) * math.hypot(DISTANCE_PX, *SIZE)
 
 
 def _wide(subject: str) -> Verdict:
@@ -182,8 +191,9 @@ def _wide(subject: str) -> Verdict:
             strips.append(polygon(np.array([(*c, 0.0) for c in corners]) @ TURN.T, color=(1.0, 0.5, 0.0)))
         scene = Scene("strips", camera_for(projection, HERE, 1.0), tuple(strips))
         found[projection] = misplacement(subject, scene)
-        allowed, why = bound_of(subject, scene, 1.0)
-        bound = max(bound, allowed)
+        bound, why = bound_of(subject, scene, 1.0)
+        if subject not in RASTERS:
+            bound, why = _CUT_PX, "float32 rays: 12 roundings of 2^-24 of the distance to the corners of cut parts"
     return placed(found, bound, why)
 
 
@@ -227,7 +237,7 @@ CASES = (
     HardCase(
         "telescope",
         "scale",
-        "The scene seen from 130 000 times its height away, parallel and perspective.",
+        "The scene seen from 130 000 and 10 million times its height away, still and moving, parallel and perspective.",
         "Every sample farther than the bound from a border is right.",
         _far_away,
         RENDERERS,

@@ -55,13 +55,15 @@ def cut_side(
         _crossing(b, a, base_distance[:, 1], base_distance[:, 0]),
         _crossing(c, a, base_distance[:, 2], base_distance[:, 0]),
     )
+    # of the two ways to halve what is left of those with two corners inside, the one along the shorter line in the view
+    other = _cosine(right, b) > _cosine(left, c)
     small = [_crossing(tips[:, 0], tips[:, k], tip_distance[:, 0], tip_distance[:, k]) for k in (1, 2)]
     out = np.concatenate(
         [
             corners[kept],
             np.stack([tips[:, 0], *small], axis=1),
-            np.stack([left, b, c], axis=1),
-            np.stack([left, c, right], axis=1),
+            np.stack([left, b, np.where(other[:, None], right, c)], axis=1),
+            np.stack([np.where(other[:, None], b, left), c, right], axis=1),
         ]
     )
     return out, np.concatenate([owners[kept], owners[one], owners[two], owners[two]])
@@ -73,6 +75,14 @@ def _turned(
     """Return the chosen triangles and distances with the lone corner first, in the same sense of rotation."""
     order = (np.argmax(lone, axis=1)[:, None] + np.arange(3)) % 3
     return corners[chosen[:, None], order], distance[chosen[:, None], order]
+
+
+def _cosine(one: FloatArray, other: FloatArray) -> FloatArray:
+    """Return (m,) the cosine between the rays to points in clip space."""
+    p, q = one[:, [0, 1, 3]], other[:, [0, 1, 3]]
+    lengths = np.linalg.norm(p, axis=1) * np.linalg.norm(q, axis=1)
+    out: FloatArray = np.divide((p * q).sum(axis=1), lengths, out=np.zeros_like(lengths), where=lengths > 0.0)
+    return out
 
 
 def _crossing(inner: FloatArray, outer: FloatArray, d_inner: FloatArray, d_outer: FloatArray) -> FloatArray:

@@ -50,6 +50,8 @@ class Pieces:
         For each triangle the index of its object.
     triangles : (m,) int64
         What it was cut from: the number of a triangle, counted body by body.
+    bodies : (m,) int32
+        The number of its body.
     matrix : (4, 4) float64
     """
 
@@ -58,6 +60,7 @@ class Pieces:
     nearest: NDArray[np.int64]
     surfaces: NDArray[np.int32]
     triangles: NDArray[np.int64]
+    bodies: NDArray[np.int32]
     matrix: FloatArray
 
 
@@ -108,9 +111,9 @@ class Guard:
         InputError
             If an orthographic picture is so small a part of an object that float64 cannot place it either.
         """
-        corners, surfaces = [np.zeros((0, 3, 7))], [np.zeros(0, np.int32)]
+        corners, surfaces, bodies = [np.zeros((0, 3, 7))], [np.zeros(0, np.int32)], [np.zeros(0, np.int32)]
         first = 0
-        for body, matrix in zip(self._bodies, matrices, strict=True):
+        for number, (body, matrix) in enumerate(zip(self._bodies, matrices, strict=True)):
             chosen = far[body.surfaces]
             if chosen.any():
                 cut, owners = _cut_body(body, matrix, chosen, self._polygon, self._perspective)
@@ -119,6 +122,7 @@ class Guard:
                 cut[..., 6] += first
                 corners.append(cut)
                 surfaces.append(owners)
+                bodies.append(np.full(len(owners), number, np.int32))
             first += len(body.triangles)
         joined = np.concatenate(corners)
         place, uv, triangles = joined[..., :4], joined[..., 4:6], joined[:, 0, 6].astype(np.int64)
@@ -128,7 +132,8 @@ class Guard:
             # z is the same for a whole body: one matrix does for all when it is divided out
             matrix[2:, 2:] = [[0.0, 1.0], [1.0, 0.0]]
             place = place[..., [0, 1, 3]] / place[..., 2:3]
-        return Pieces(place[..., :3], uv, nearest, np.concatenate(surfaces), triangles, matrix)
+        owners = np.concatenate(surfaces)
+        return Pieces(place[..., :3], uv, nearest, owners, triangles, np.concatenate(bodies), matrix)
 
 
 def _surely_near(matrices: FloatArray, boxes: FloatArray, limit: float, perspective: bool) -> BoolArray:

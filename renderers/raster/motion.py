@@ -17,7 +17,7 @@ from aliasbench.renderers.raster.graphics import DEPTH32F, GraphicsContext
 from aliasbench.renderers.raster.guard import BoolArray, Guard, Pieces
 from aliasbench.renderers.raster.pipeline import SceneBuffers, _Batch
 from aliasbench.renderers.raster.placement import Placement
-from aliasbench.renderers.raster.projection import DepthRule, Instant, Window, clip_matrices, pack_matrices
+from aliasbench.renderers.raster.projection import DepthRule, Instant, Window, clip_matrices, layer_tilts, pack_matrices
 from aliasbench.renderers.raster.stages import Image, Jitter
 from aliasbench.renderers.technique import Technique
 from aliasbench.scenes.model import FloatArray, Scene
@@ -81,7 +81,9 @@ class MotionBuffers(SceneBuffers):
         made.callback(self.release)
         self._moves: tuple[FloatArray, FloatArray] = (np.zeros((0, 4, 4)), np.zeros((0, 4, 4)))
 
-    def draw_moved(self, matrices: FloatArray, before: FloatArray, size: tuple[int, int], guard: Guard) -> None:
+    def draw_moved(
+        self, matrices: FloatArray, before: FloatArray, tilts: FloatArray, size: tuple[int, int], guard: Guard
+    ) -> None:
         """Draw into the bound target every body with its matrix (n, 4, 4) now and in the frame before."""
         self._moves = (matrices, before)
         packed = pack_matrices(before, self._row_length, self._before.height)
@@ -93,11 +95,11 @@ class MotionBuffers(SceneBuffers):
             batch.array.program["is_piece"] = False
         far = guard.far_objects(matrices)
         if far.any():
-            self.draw(matrices, guard.cut(matrices, far), far)
+            self.draw(matrices, tilts, guard.cut(matrices, far), far)
         else:
-            self.draw(matrices)
+            self.draw(matrices, tilts)
 
-    def _draw_pieces(self, batch: _Batch, pieces: Pieces, body: int) -> None:
+    def _draw_pieces(self, batch: _Batch, pieces: Pieces, first: int) -> None:
         program = batch.array.program
         program["is_piece"] = True
         for number, (owned, now, before) in enumerate(zip(self._owners, *self._moves, strict=True)):
@@ -107,7 +109,7 @@ class MotionBuffers(SceneBuffers):
                 moves = not np.array_equal(now[[0, 1, 3]], before[[0, 1, 3]])
                 program["carried"] = tuple(carried.T.astype(np.float32).ravel().tolist())
                 program["piece_surface"] = float(number + 1) * (-1.0 if moves else 1.0)
-                super()._draw_pieces(batch, _some(pieces, mine), body)
+                super()._draw_pieces(batch, _some(pieces, mine), first)
         program["is_piece"] = False
 
     def release(self) -> None:
@@ -124,6 +126,7 @@ def _some(pieces: Pieces, chosen: BoolArray) -> Pieces:
         nearest=pieces.nearest[chosen],
         surfaces=pieces.surfaces[chosen],
         triangles=pieces.triangles[chosen],
+        bodies=pieces.bodies[chosen],
     )
 
 
@@ -180,12 +183,16 @@ class Motion:
         for row in (0, 1, 3):
             before[stands, row] = matrices[stands, row]
         self.now.begin()
-        self._buffers.draw_moved(matrices, before, self._size, self._guard)
+        tilts = layer_tilts(self._scene, self._placement, self._instant(frame, jitter), self._size)
+        self._buffers.draw_moved(matrices, before, tilts, self._size, self._guard)
         return bool(stands.all())
 
-    def _matrices(self, frame: int, jitter: Jitter) -> FloatArray:
+    def _instant(self, frame: int, jitter: Jitter) -> Instant:
         fraction = shutter_fraction(self._scene.animation, 0.5)
-        instant = Instant(frame, fraction, jitter, interpolated=self._interpolated)
+        return Instant(frame, fraction, jitter, interpolated=self._interpolated)
+
+    def _matrices(self, frame: int, jitter: Jitter) -> FloatArray:
+        instant = self._instant(frame, jitter)
         return clip_matrices(self._scene, self._placement, instant, size=self._size, window=Window(0, 0, *self._size))
 
     def release(self) -> None:

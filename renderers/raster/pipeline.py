@@ -90,8 +90,8 @@ class SceneBuffers:
             excess = coverage_excess(context, technique.msaa)
             for shading in self._shadings:
                 shading.uniforms["coverage_excess"] = excess
-        # one more matrix than bodies: that of the pieces
-        count = len(bodies) + 1
+        # bodies, and their pieces
+        count = 2 * len(bodies)
         rows = -(-count // BODIES_PER_ROW)
         if rows > context.max_texture_size:
             raise InputError(f"{len(bodies)} bodies: this device takes {context.max_texture_size * BODIES_PER_ROW}")
@@ -121,8 +121,17 @@ class SceneBuffers:
         layout = " ".join(sizes[n] if u else padding[sizes[n]] for n, u in zip(sizes, used, strict=True))
         return self._context.gl.vertex_array(program, [(vertices, layout, *(u for u in used if u))], index)
 
-    def draw(self, matrices: FloatArray, pieces: Pieces | None = None, far: BoolArray | None = None) -> None:
-        """Draw into the bound target every body with its matrix (n, 4, 4), the far objects as pieces instead."""
+    def draw(
+        self,
+        matrices: FloatArray,
+        tilts: FloatArray,
+        pieces: Pieces | None = None,
+        far: BoolArray | None = None,
+    ) -> None:
+        """Draw into the bound target every body with its matrix (n, 4, 4), the far objects as pieces instead.
+
+        `tilts` (n,) are added to depth values.
+        """
         if not self._batches:
             return
         coarse = self._is_coarse if far is None else self._is_coarse & ~far
@@ -132,8 +141,13 @@ class SceneBuffers:
                 f"coordinates cannot tell one from the next (over {_MOST_REPEATS:.0e} times); divide the surface"
             )
         self._leave_out(far)
+        count = len(matrices)
         if pieces is not None:
-            matrices = np.concatenate([matrices, pieces.matrix[None]])
+            matrices = np.concatenate([matrices, np.broadcast_to(pieces.matrix, matrices.shape)])
+            tilts = np.tile(tilts, 2)
+        if tilts.any():
+            matrices = matrices.copy()
+            matrices[:, 2] += tilts[:, None] * matrices[:, 3]
         self._matrices.write(pack_matrices(matrices, self._row_length, self._matrices.height).tobytes())
         self._matrices.use(0)
         placing = {} if self.light is None else self.light.use()
@@ -149,11 +163,11 @@ class SceneBuffers:
                 batch.shading.image.use(1)
             if batch.shading.is_coverage:
                 self._context.gl.enable_direct(ALPHA_TO_COVERAGE)
-            count = len(batch.triangles) if far is None else int(np.count_nonzero(~far[batch.owners]))
-            if count:
-                batch.array.render(moderngl.TRIANGLES, vertices=3 * count)
+            kept = len(batch.triangles) if far is None else int(np.count_nonzero(~far[batch.owners]))
+            if kept:
+                batch.array.render(moderngl.TRIANGLES, vertices=3 * kept)
             if pieces is not None:
-                self._draw_pieces(batch, pieces, body=len(matrices) - 1)
+                self._draw_pieces(batch, pieces, first=count)
             if batch.shading.is_coverage:
                 self._context.gl.disable_direct(ALPHA_TO_COVERAGE)
 
@@ -166,12 +180,13 @@ class SceneBuffers:
             batch.index.write(np.ascontiguousarray(batch.triangles[~wanted[batch.owners]]).tobytes())
         self._left_out = wanted.copy()
 
-    def _draw_pieces(self, batch: _Batch, pieces: Pieces, body: int) -> None:
+    def _draw_pieces(self, batch: _Batch, pieces: Pieces, first: int) -> None:
+        """Draw those of a batch's objects; `first` is the number of the first body's matrix for pieces."""
         chosen = np.isin(pieces.surfaces, batch.owners)
         if not chosen.any():
             return
         vertices = np.zeros((int(chosen.sum()), 3), _VERTEX)
-        vertices["position"], vertices["body"] = pieces.corners[chosen], body
+        vertices["position"], vertices["body"] = pieces.corners[chosen], first + pieces.bodies[chosen][:, None]
         vertices["color"] = self._colors[pieces.surfaces[chosen]][:, None]
         if self.light is not None:
             vertices["triangle"] = self.light.ranks[pieces.triangles[chosen]][:, None]

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from aliasbench.renderers.geometry import LAYER_STEP
+from aliasbench.renderers.geometry import LAYER_STEP, LAYER_TILT, layered_depth
 from aliasbench.renderers.raster.placement import Placement, body_matrices
 from aliasbench.scenes.errors import InputError
 from aliasbench.scenes.model import Camera, FloatArray, Scene
@@ -23,6 +23,8 @@ from aliasbench.scenes.projection import View, focus_at, lens_view, view_at
 
 # near in units of the farthest point: small enough to cut nothing, and far from float32's smallest numbers
 _NEAR = 2.0**-64
+_FAR = 1.01  # the greatest depth, likewise: a little beyond, so that rounding cannot push the farthest point out
+_LEAST_HEIGHT = 2.0**-20  # of the farthest: a plane nearer to the eye is seen as a line
 # world units; a scene that is a single point still needs a unit of depth
 _LEAST_DISTANT = 2.0**-100
 # world units; beyond, products of lengths and scales leave float32 (2^127) even after cutting
@@ -126,15 +128,50 @@ def _compose(
     local = body_matrices(
         placement, scene.animation, instant.frame, instant.fraction, view.origin, interpolated=instant.interpolated
     )
-    # Frobenius norm: no direction is stretched by more
-    reach = np.linalg.norm(local[:, :3, 3], axis=1) + placement.radii * np.linalg.norm(local[:, :3, :3], axis=(1, 2))
-    farthest = max(float(reach.max(initial=0.0)), _LEAST_DISTANT)
+    farthest = _farthest(placement, local)
     clip = np.repeat(view_matrix(view, farthest, instant.jitter, window)[None], len(local), axis=0)
-    # layer k is nearer by k steps of its distance: only the row of depth changes, never where a point is drawn
-    closer = 1.0 - LAYER_STEP * placement.layers
-    clip[:, 2] *= (1.0 / closer if view.perspective else closer)[:, None]
+    if view.perspective:
+        # layer k is nearer by k steps of its distance: only the row of depth changes, never where a point is drawn
+        clip[:, 2] /= (1.0 - LAYER_STEP * placement.layers)[:, None]
     out: FloatArray = clip @ local
     return out, farthest
+
+
+def layer_tilts(scene: Scene, placement: Placement, instant: Instant, size: tuple[int, int]) -> FloatArray:
+    """Return (n,): what is added to each body's depth values for its layer's tilt (see `geometry`).
+
+    A share that grows with depth is a constant of what is one over it. Under parallel rays a layer is brought nearer by
+    a share of the greatest depth, and no more.
+    """
+    if not placement.layers.any():
+        return np.zeros(len(placement.layers))
+    view = pass_view(scene, instant, size)
+    local = body_matrices(
+        placement, scene.animation, instant.frame, instant.fraction, view.origin, interpolated=instant.interpolated
+    )
+    farthest = _farthest(placement, local)
+    if not view.perspective:
+        return placement.layers * (-LAYER_STEP * layered_depth(placement.bodies, view) / (_FAR * farthest))
+    heights = np.maximum(_eye_heights(placement.planes, local), _LEAST_HEIGHT * farthest)
+    out: FloatArray = placement.layers * (LAYER_TILT * _NEAR * farthest / heights)
+    return out
+
+
+def _farthest(placement: Placement, local: FloatArray) -> float:
+    # Frobenius norm: no direction is stretched by more
+    reach = np.linalg.norm(local[:, :3, 3], axis=1) + placement.radii * np.linalg.norm(local[:, :3, :3], axis=(1, 2))
+    return max(float(reach.max(initial=0.0)), _LEAST_DISTANT)
+
+
+def _eye_heights(planes: FloatArray, local: FloatArray) -> FloatArray:
+    """Return (n,): how far the eye is from planes of bodies, which `local` (n, 4, 4) places relative to the eye."""
+    origins = local[:, :3, 3]
+    # a plane's normal is turned as the inverse's transpose, which a body squeezed flat has not
+    normals = np.einsum("nij,nj->ni", np.linalg.pinv(local[:, :3, :3]).transpose(0, 2, 1), planes[:, :3])
+    lengths = np.linalg.norm(normals, axis=1)
+    distance = np.abs(np.einsum("ni,ni->n", normals, origins) + planes[:, 3])
+    out: FloatArray = np.divide(distance, lengths, out=np.full_like(lengths, np.inf), where=lengths > 0.0)
+    return out
 
 
 def view_matrix(view: View, farthest: float, jitter: tuple[float, float], window: Window) -> FloatArray:
@@ -155,8 +192,7 @@ def _projection(view: View, farthest: float, jitter: tuple[float, float], window
     if view.perspective:
         near = _NEAR * farthest
         return np.array([[sx, 0, jx, 0], [0, sy, jy, 0], [0, 0, 0, near], [0, 0, 1, 0]])
-    # a little beyond, so that rounding cannot push the farthest point out
-    return np.array([[sx, 0, 0, jx], [0, sy, 0, jy], [0, 0, 1 / (1.01 * farthest), 0], [0, 0, 0, 1]])
+    return np.array([[sx, 0, 0, jx], [0, sy, 0, jy], [0, 0, 1 / (_FAR * farthest), 0], [0, 0, 0, 1]])
 
 
 def pack_matrices(matrices: FloatArray, row_length: int, rows: int) -> NDArray[np.float32]:

@@ -34,6 +34,7 @@ from aliasbench.renderers.raster.projection import (
     Window,
     clip_matrices,
     depth_rule,
+    layer_tilts,
     pass_view,
 )
 from aliasbench.renderers.raster.targets import Target, make_layout
@@ -271,10 +272,11 @@ class RasterScene:
             self._buffers.light.update(exposure, instant, pass_view(self._scene, instant, drawn), part.window)
         far = part.guard.far_objects(matrices)
         self._target.begin(self._scene.background)
+        tilts = layer_tilts(self._scene, self._placement, instant, drawn)
         if far.any():
-            self._buffers.draw(matrices, part.guard.cut(matrices, far), far)
+            self._buffers.draw(matrices, tilts, part.guard.cut(matrices, far), far)
         else:
-            self._buffers.draw(matrices)
+            self._buffers.draw(matrices, tilts)
         return self._target.finish(exposure.jitter)
 
     def close(self) -> None:

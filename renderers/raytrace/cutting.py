@@ -20,10 +20,11 @@ _ROUNDING, _TOLERANCE_PX = 8.0 * 2.0**-24, 2.0**-8
 _WIDTH = 2.0  # pictures: how wide a tube about an orthographic camera's axis is left whole
 _STEP = 8.0  # between one plane's distance from a pinhole and the next one's
 _MOST_STEPS = 64
-_THROUGH_EYE = 2.0**-48  # distance of a plane from the eye, relative to what it is reckoned from
 
 
-def cut_large(mesh: Mesh, view: View, anchor: FloatArray, travel: float) -> tuple[Mesh, NDArray[np.int64] | None]:
+def cut_large(
+    mesh: Mesh, view: View, anchor: FloatArray, travel: float, nearest: float = np.inf, *, robust: bool = True
+) -> tuple[Mesh, NDArray[np.int64] | None]:
     """Return a mesh of the same surface whose outlines float32 places to 1/256 px, and of which triangle each of its
     triangles is a part; the mesh itself, and None, if float32 does.
 
@@ -33,6 +34,10 @@ def cut_large(mesh: Mesh, view: View, anchor: FloatArray, travel: float) -> tupl
         Vertices are relative to `anchor`.
     view : View
         What is to be seen well; `travel` is how far the camera may come from there, in world units.
+    nearest : float
+        How near a pinhole what must be cut whatever its outline begins, see `layers`.
+    robust : bool
+        Rays that are not robust slip through edges inside of a surface that are misplaced as well.
     """
     if not len(mesh.triangles):
         return mesh, None
@@ -45,8 +50,8 @@ def cut_large(mesh: Mesh, view: View, anchor: FloatArray, travel: float) -> tupl
             return mesh, None
         distances = [tube]
     else:
-        nearest = _nearest_of_misplaced(mesh, local, view)
-        if nearest is None:
+        nearest = min(nearest, _nearest_of_misplaced(_outline(mesh) if robust else _edges(mesh), local, view))
+        if nearest == np.inf:
             return mesh, None
         steps = min(_MOST_STEPS, 1 + int(np.log(max(reach / nearest, 1.0)) / np.log(_STEP)))
         distances = [float(nearest * _STEP**k) for k in range(steps)]
@@ -55,9 +60,14 @@ def cut_large(mesh: Mesh, view: View, anchor: FloatArray, travel: float) -> tupl
     return _cut(mesh, [(normal, offset + float(normal @ (view.origin - anchor))) for normal, offset in planes])
 
 
+def _edges(mesh: Mesh) -> NDArray[np.int64]:
+    """Return (3 m, 2): the vertices of the triangles' edges, the lower number first."""
+    return np.sort(mesh.triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1).astype(np.int64)
+
+
 def _outline(mesh: Mesh) -> NDArray[np.int64]:
     """Return (k, 2): the vertices of edges that belong to one triangle alone."""
-    edges = np.sort(mesh.triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1).astype(np.int64)
+    edges = _edges(mesh)
     _, first, count = np.unique(edges @ [len(mesh.vertices), 1], return_index=True, return_counts=True)
     out: NDArray[np.int64] = edges[first[count == 1]]
     return out
@@ -72,12 +82,12 @@ def _leaves_tube(mesh: Mesh, local: FloatArray, tube: float) -> NDArray[np.bool_
     return out
 
 
-def _nearest_of_misplaced(mesh: Mesh, local: FloatArray, view: View) -> float | None:
-    """Return how near the eye edges of the outline come that float32 misplaces in the picture, None if there is none.
+def _nearest_of_misplaced(edges: NDArray[np.int64], local: FloatArray, view: View) -> float:
+    """Return how near the eye edges come that float32 misplaces in the picture, infinity if there is none.
 
     An edge's rounding turns it by its largest coordinate over its line's distance from the eye.
     """
-    ends = local[_outline(mesh)]
+    ends = local[edges]
     reach = np.abs(ends).max(axis=(1, 2))
     along = ends[:, 1] - ends[:, 0]
     length = np.linalg.norm(along, axis=1)
@@ -90,7 +100,7 @@ def _nearest_of_misplaced(mesh: Mesh, local: FloatArray, view: View) -> float | 
     hidden = (ends[..., :2] > beyond).all(axis=1) | (ends[..., :2] < -beyond).all(axis=1)
     bad = ~np.any(hidden, axis=1) & (near > 0.0) & (length > _STEP * near)
     bad &= reach * view.scale * _ROUNDING > _TOLERANCE_PX * height
-    return float(near[bad].min()) if bad.any() else None
+    return float(near[bad].min(initial=np.inf))
 
 
 def _cut(mesh: Mesh, planes: list[tuple[FloatArray, float]]) -> tuple[Mesh, NDArray[np.int64]]:
@@ -131,24 +141,3 @@ def _crossing(corners: FloatArray, distance: FloatArray, k: int) -> FloatArray:
     share = (below / (below - above))[:, None]
     out: FloatArray = low + share * (high - low)
     return out
-
-
-def edge_on(mesh: Mesh, eye: FloatArray, flat: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Return the triangles whose plane holds a pinhole but for rounding, of objects that are `flat`.
-
-    A pinhole sees nothing of a polygon in whose plane it is; rounded to float32 such a polygon passes by it at some
-    distance, and may hide half of the picture.
-    """
-    numbers = np.flatnonzero(flat[mesh.owners])
-    a, b, c = (mesh.vertices[mesh.triangles[numbers, k]] - eye for k in range(3))
-    first, second = b - a, c - a
-    distance = np.abs((np.cross(first, second) * a).sum(axis=1))
-    lengths = np.prod([np.linalg.norm(v, axis=1) for v in (a, first, second)], axis=0)
-    out: NDArray[np.int64] = numbers[distance <= _THROUGH_EYE * lengths]
-    return out
-
-
-def without(mesh: Mesh, dropped: NDArray[np.int64]) -> tuple[Mesh, NDArray[np.int64]]:
-    """Return a mesh without some of its triangles, and which of them it keeps."""
-    kept = np.setdiff1d(np.arange(len(mesh.triangles)), dropped)
-    return Mesh(mesh.vertices, mesh.triangles[kept], mesh.uv, mesh.owners[kept], mesh.holed[kept]), kept

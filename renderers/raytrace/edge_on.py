@@ -1,4 +1,4 @@
-"""Triangles that a still camera looks at along their plane: they have no area in the picture, and Embree is not told.
+"""Triangles that a camera looks at along their plane: they have no area in the picture, and Embree is not told.
 
 For a ray in a triangle's plane all three of Embree's edge tests are rounding and nothing else, in robust mode too: one
 ray in some ten "hits" the triangle anywhere within its bounding box, pixels away from where it lies. A closed mesh with
@@ -6,49 +6,46 @@ sides along the rays then shows them beside its outline. What is left out is thi
 are exact; what merely is small or thin, but faces the camera, stays, so that surfaces keep no gaps.
 """
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 
 from aliasbench.renderers.raytrace.tables import Mesh
-from aliasbench.scenes.model import Camera, FloatArray
+from aliasbench.scenes.model import FloatArray
 from aliasbench.scenes.projection import View
 
 # Sine of the angle between ray and plane. Float32 keeps the sign of any volume above some 2^-20 of its factors.
 _STEEPEST = 2.0**-12
+_THROUGH_EYE = 2.0**-48  # distance of a plane from the eye, relative to what it is reckoned from
 _DEEPEST = 8.0  # farthest over least depth of a triangle of which all parts are seen alike
 # Of 2^-24: what the roundings of Embree's robust test add up to at most, see `bench.hard.edge_pictures`.
 _ROUNDINGS = 16.0
 
 
-def keeps_planes(camera: Camera) -> bool:
-    """Return whether what a camera sees along its plane at one time it sees so at all times, if it is at rest."""
-    return camera.lens_radius == 0.0 and (
-        camera.is_static or (camera.projection == "orthographic" and camera.target_velocity is None)
-    )
+def through_eye(mesh: Mesh, eye: FloatArray, flat: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Return the triangles whose plane holds a pinhole but for rounding, of objects that are `flat`.
 
-
-def without_edge_on(mesh: Mesh, view: View, anchor: FloatArray) -> Mesh:
-    """Return the mesh (relative to `anchor`) with the triangles that `view` sees along their plane sent nowhere.
-
-    Their vertex is not a number, so that Embree leaves them out and all others keep their numbers.
+    A pinhole sees nothing of a polygon in whose plane it is; rounded to float32 such a polygon passes by it at some
+    distance, and may hide half of the picture.
     """
+    numbers = np.flatnonzero(flat[mesh.owners])
+    a, b, c = (mesh.vertices[mesh.triangles[numbers, k]] - eye for k in range(3))
+    first, second = b - a, c - a
+    distance = np.abs((np.cross(first, second) * a).sum(axis=1))
+    lengths = np.prod([np.linalg.norm(v, axis=1) for v in (a, first, second)], axis=0)
+    out: NDArray[np.int64] = numbers[distance <= _THROUGH_EYE * lengths]
+    return out
+
+
+def seen_edge_on(mesh: Mesh, view: View, anchor: FloatArray) -> NDArray[np.int64]:
+    """Return the triangles of a mesh (relative to `anchor`) that `view` sees along their plane."""
     rows = np.flatnonzero(_are_steep(mesh, view, anchor))
-    if not len(rows):
-        return mesh
-    rows = rows[_are_thin(mesh.vertices[mesh.triangles[rows]] + anchor, view)]
-    if not len(rows):
-        return mesh
-    triangles = mesh.triangles.copy()
-    triangles[rows] = len(mesh.vertices)
-    nowhere = np.full((1, 3), np.nan)
-    return replace(
-        mesh,
-        vertices=np.concatenate([mesh.vertices, nowhere]),
-        triangles=triangles,
-        uv=np.concatenate([mesh.uv, np.zeros((1, 2))]),
-    )
+    return rows[_are_thin(mesh.vertices[mesh.triangles[rows]] + anchor, view)] if len(rows) else rows
+
+
+def without(mesh: Mesh, dropped: NDArray[np.int64]) -> tuple[Mesh, NDArray[np.int64]]:
+    """Return a mesh without some of its triangles, and which of them it keeps."""
+    kept = np.setdiff1d(np.arange(len(mesh.triangles)), dropped)
+    return Mesh(mesh.vertices, mesh.triangles[kept], mesh.uv, mesh.owners[kept], mesh.holed[kept]), kept
 
 
 def _are_steep(mesh: Mesh, view: View, anchor: FloatArray) -> NDArray[np.bool_]:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aliasbench.renderers.geometry import Body
+from aliasbench.renderers.geometry import Body, layered_depth
 from aliasbench.renderers.raytrace.bodies import Shutter
 from aliasbench.renderers.raytrace.start import Spheres, find_start
 from aliasbench.renderers.technique import Technique
@@ -20,7 +20,6 @@ from aliasbench.scenes.projection import View, view_at
 
 # Above this many triangles an instant of a moving mesh is traced in the mesh's own frame instead of rebuilt.
 MERGE_LIMIT = 4096
-_WIDEST = 4.0  # pictures: larger surfaces are cut to parts of this size (`cutting`)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,7 +66,7 @@ def plan_exposure(
     anchor_view = view_at(scene.camera, scene.animation, anchor_frame, 0.0, size)
     anchor = anchor_view.origin + start * anchor_view.forward
     travel = 0.0 if not any(scene.camera.velocity) else _reach(scene)
-    depth = _layer_depth(bodies, first, travel, start, share)
+    depth = share if first.perspective else layered_depth(bodies, first, travel, start)
     is_matrix = technique.motion == "matrix"
     shutter = Shutter(frame, opening, closing, first, last, depth, scene.camera.lens_radius, is_matrix)
     # A layer above others is brought towards the eye, and so moves with it.
@@ -110,25 +109,3 @@ def _anchor_frame(scene: Scene, frame: int) -> int:
 
 def _reach(scene: Scene) -> float:
     return float(np.linalg.norm(np.subtract(scene.camera.target, scene.camera.position)))
-
-
-def _layer_depth(bodies: Sequence[Body], view: View, travel: float, start: float, share: float) -> float:
-    """Return the distance that layers under parallel rays are a share of: the greatest depth, or half width of what
-    can be seen, of anything with a layer at rest; for a pinhole the `share` of the reach that rays do go.
-
-    What of it is out of sight does not count, or a sheet that reaches far out would be brought behind the camera.
-    """
-    if view.perspective:
-        return share
-    wide = _WIDEST * (max(view.width, view.height) / view.scale + travel)
-    far = 0.0
-    for body in bodies:
-        if not body.layer or not len(body.triangles):
-            continue
-        place = view.to_camera(body.vertices + body.origin)[body.triangles]
-        normal = np.cross(place[:, 1] - place[:, 0], place[:, 2] - place[:, 0])
-        with np.errstate(divide="ignore", invalid="ignore"):
-            seen = np.abs((normal * place[:, 0]).sum(axis=1)) + wide * np.abs(normal[:, :2]).sum(axis=1)
-            depth = np.fmin(seen / np.abs(normal[:, 2]), np.abs(place[..., 2]).max(axis=1)) - start
-        far = max(far, float(depth.max()), min(wide, float(np.abs(place[..., :2]).max())))
-    return far or 1.0

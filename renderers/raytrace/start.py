@@ -32,16 +32,21 @@ class Spheres:
 
     @classmethod
     def about(cls, bodies: Sequence[Body]) -> Self:
-        """Return the spheres about bodies, however they spin."""
-        filled = [b for b in bodies if len(b.triangles)]
-        centers, velocities, radii = np.zeros((len(filled), 3)), np.zeros((len(filled), 3)), np.zeros(len(filled))
-        for k, body in enumerate(filled):
-            radius = float(np.linalg.norm(body.vertices, axis=1).max())
-            spin = body.motion.spin
-            pivot = body.origin if spin is None else np.asarray(spin.center, dtype=np.float64)
-            centers[k], velocities[k] = pivot, body.motion.velocity
-            radii[k] = radius + float(np.linalg.norm(body.origin - pivot))
-        return cls(centers, velocities, radii)
+        """Return the spheres about bodies, however they spin; about those that matrices move, at both ends."""
+        centers, velocities, radii = [np.zeros((0, 3))], [np.zeros((0, 3))], [np.zeros(0)]
+        for body in bodies:
+            motion, radius = body.motion, np.linalg.norm(body.vertices, axis=1).max(initial=0.0)
+            if motion.matrices is not None:
+                for matrix in (np.reshape(m, (4, 4)) for m in motion.matrices):
+                    centers.append((matrix[:3, :3] @ body.origin + matrix[:3, 3])[None])
+                    velocities.append(np.zeros((1, 3)))
+                    radii.append(np.atleast_1d(radius * np.linalg.norm(matrix[:3, :3])))
+                continue
+            pivot = body.origin if motion.spin is None else np.asarray(motion.spin.center, dtype=np.float64)
+            centers.append(pivot[None])
+            velocities.append(np.asarray(motion.velocity, dtype=np.float64)[None])
+            radii.append(np.atleast_1d(radius + np.linalg.norm(body.origin - pivot)))
+        return cls(np.concatenate(centers), np.concatenate(velocities), np.concatenate(radii))
 
 
 def find_start(spheres: Spheres, scene: Scene, views: tuple[View, View], frame: int) -> tuple[float, float]:

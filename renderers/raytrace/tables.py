@@ -87,13 +87,18 @@ def body_mesh(body: Body, looks: "Looks") -> Mesh:
     return Mesh(body.vertices, body.triangles, body.uv, body.surfaces, looks.holed[body.surfaces])
 
 
-def merge_bodies(scene: Scene, looks: "Looks", bodies: Sequence[Body], shutter: Shutter, anchor: FloatArray) -> Mesh:
-    """Return bodies as they stand when the shutter opens, relative to `anchor`, as one mesh."""
+def merge_bodies(
+    scene: Scene, looks: "Looks", bodies: Sequence[Body], shutter: Shutter, anchor: FloatArray, *, layered: bool
+) -> Mesh:
+    """Return bodies as they stand when the shutter opens, relative to `anchor`, as one mesh.
+
+    `layered`: higher layers are brought nearer.
+    """
     vertices, triangles, count = [np.zeros((0, 3))], [np.zeros((0, 3), np.int32)], 0
     for body in bodies:
         world = shutter.place(body.motion, scene.animation, shutter.opening)
         matrix = body.local_matrix(world, anchor)
-        if body.layer:
+        if layered and body.layer:
             matrix = layer_matrix(shutter.first, body.layer, shutter.layer_depth, anchor) @ matrix
         vertices.append(body.vertices @ matrix[:3, :3].T + matrix[:3, 3])
         triangles.append(body.triangles + np.int32(count))

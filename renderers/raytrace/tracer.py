@@ -18,15 +18,14 @@ from aliasbench.renderers.geometry import build_bodies
 from aliasbench.renderers.lights import light_values, with_lights
 from aliasbench.renderers.raytrace.allocation import error_exponent
 from aliasbench.renderers.raytrace.bodies import BODY_SIZE, body_values
-from aliasbench.renderers.raytrace.cutting import cut_large, edge_on, without
 from aliasbench.renderers.raytrace.development import Development, Room, is_plain, make_optics
-from aliasbench.renderers.raytrace.edge_on import keeps_planes, without_edge_on
 from aliasbench.renderers.raytrace.exposure import Exposure, plan_exposure
 from aliasbench.renderers.raytrace.film import Film
 from aliasbench.renderers.raytrace.lighting import is_scattered, put_materials
 from aliasbench.renderers.raytrace.paths import Scattering
 from aliasbench.renderers.raytrace.shading import Tables
 from aliasbench.renderers.raytrace.start import Spheres
+from aliasbench.renderers.raytrace.still import Still
 from aliasbench.renderers.raytrace.tables import (
     Mesh,
     body_mesh,
@@ -34,7 +33,6 @@ from aliasbench.renderers.raytrace.tables import (
     build_ownership,
     build_tables,
     camera_values,
-    merge_bodies,
 )
 from aliasbench.renderers.sampling.hashing import frame_key
 from aliasbench.renderers.sampling.patterns import Pattern, make_pattern, pattern_frame
@@ -145,11 +143,9 @@ class PreparedRaytrace:
         "_bodies",
         "_engine",
         "_footprint",
-        "_hidden",
         "_is_plain",
         "_is_scattered",
         "_looks",
-        "_mesh_key",
         "_moving",
         "_optics",
         "_placed",
@@ -160,7 +156,6 @@ class PreparedRaytrace:
         "_spheres",
         "_still",
         "_technique",
-        "_whole",
     )
 
     def __init__(
@@ -176,9 +171,7 @@ class PreparedRaytrace:
         put_materials(scene, self._looks.objects)
         self._placed = self._looks.textured or self._is_scattered
         self._footprint = float(technique.shading_samples) ** -0.5
-        self._mesh_key: tuple[float, ...] = ()
-        self._hidden = np.zeros(0, np.int64)
-        self._still = self._moving = build_ownership((), placed=False)
+        self._still = Still(scene, self._looks, placed=self._placed, lit=self._is_scattered, robust=technique.robust)
         self._optics = make_optics(technique, size[0])
         self._room = Room()
         has_lens = scene.camera.lens_radius > 0.0
@@ -188,7 +181,7 @@ class PreparedRaytrace:
         meshes = [body_mesh(body, self._looks) for body in exposure.moving]
         engine.set_moving(meshes)
         self._moving = build_ownership(meshes, placed=self._placed)
-        self._place(exposure)
+        self._still.place(exposure, engine.set_still)
         self._setup_seconds = time.perf_counter() - started
         self._size = (1, 1)
         self._expose(exposure, frame_key(0, 0), None)
@@ -202,43 +195,12 @@ class PreparedRaytrace:
         started = time.perf_counter()
         technique = self._technique
         exposure = plan_exposure(self._scene, technique, self._size, self._bodies, self._spheres, frame)
-        self._place(exposure)
+        self._still.place(exposure, self._engine.set_still)
         start = frame_key(seed, pattern_frame(technique.reseed, frame))
         pixels, counts = self._expose(exposure, start, progress)
         seconds = time.perf_counter() - started
         samples = self._size[0] * self._size[1] * technique.spp if counts is None else int(counts.sum(dtype=np.int64))
         return Frame(pixels, seconds, self._setup_seconds, samples, counts)
-
-    def _place(self, exposure: Exposure) -> None:
-        """Give the engine the still mesh of an exposure, unless it has it."""
-        known = exposure.mesh_key == self._mesh_key
-        if known and self._scene.camera.is_static:
-            return
-        if not known:
-            self._whole = merge_bodies(self._scene, self._looks, exposure.still, exposure.shutter, exposure.anchor)
-        hidden = self._find_edge_on(exposure)
-        if known and np.array_equal(hidden, self._hidden):
-            return
-        mesh, kept = (self._whole, None) if not len(hidden) else without(self._whole, hidden)
-        mesh, parents = cut_large(mesh, exposure.anchor_view, exposure.anchor, exposure.travel)
-        # light comes from all sides; a camera sees only what faces it
-        if not self._is_scattered and keeps_planes(self._scene.camera):
-            mesh = without_edge_on(mesh, exposure.shutter.first, exposure.anchor)
-        self._engine.set_still(mesh)
-        # a part has its whole triangle's plane and texture map, which its own corners know less well
-        still = build_ownership((self._whole,), placed=self._placed)
-        for chosen in (kept, parents):
-            still = still if chosen is None else still.of_parts(chosen)
-        self._still, self._hidden, self._mesh_key = still, hidden, exposure.mesh_key
-
-    def _find_edge_on(self, exposure: Exposure) -> NDArray[np.int64]:
-        """Return the triangles of the still mesh that a pinhole sees nothing of; those that cast shadows stay."""
-        camera, shutter = self._scene.camera, exposure.shutter
-        moves = shutter.opening != shutter.closing and not camera.is_static
-        if camera.projection != "perspective" or camera.lens_radius > 0.0 or moves or self._is_scattered:
-            return np.zeros(0, np.int64)
-        flat = np.array([s.is_polygon for s in self._scene.objects], dtype=bool)
-        return edge_on(self._whole, shutter.first.origin - exposure.anchor, flat)
 
     def _expose(
         self, exposure: Exposure, start: int, progress: Progress | None
@@ -249,7 +211,7 @@ class PreparedRaytrace:
         for values, body in zip(bodies, exposure.moving, strict=True):
             values[:] = body_values(scene, body, shutter, anchor)
         lights = light_values(scene, shutter.first, anchor)
-        tables = build_tables(scene, self._looks, self._still, self._moving, bodies, lights, self._footprint)
+        tables = build_tables(scene, self._looks, self._still.ownership, self._moving, bodies, lights, self._footprint)
         camera = camera_values(scene, shutter, anchor, exposure.start)
         is_adaptive = t.adaptive != "off"
         pattern = make_pattern(
