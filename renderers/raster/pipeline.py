@@ -90,8 +90,8 @@ class SceneBuffers:
             excess = coverage_excess(context, technique.msaa)
             for shading in self._shadings:
                 shading.uniforms["coverage_excess"] = excess
-        # bodies, and their pieces
-        count = 2 * len(bodies)
+        # bodies, and their pieces; a texture has at least one
+        count = max(2 * len(bodies), 1)
         rows = -(-count // BODIES_PER_ROW)
         if rows > context.max_texture_size:
             raise InputError(f"{len(bodies)} bodies: this device takes {context.max_texture_size * BODIES_PER_ROW}")

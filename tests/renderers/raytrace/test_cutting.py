@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from aliasbench.renderers.catalog import prepare, render
-from aliasbench.renderers.raytrace.cutting import cut_large, edge_on, without
+from aliasbench.renderers.raytrace.cutting import cut_large
+from aliasbench.renderers.raytrace.edge_on import through_eye, without
 from aliasbench.renderers.raytrace.tables import Mesh
 from aliasbench.scenes.model import Animation, Camera, Checker, FloatArray, Scene
 from aliasbench.scenes.projection import view_at
@@ -152,9 +153,9 @@ def test_only_flat_objects_are_dropped() -> None:
     corners = sheet_through(EYES[0], 5.0)
     mesh = mesh_of(corners)
     eye = np.array(EYES[0])
-    assert edge_on(mesh, eye, np.array([True])).tolist() == [0, 1]
-    assert not len(edge_on(mesh, eye, np.array([False])))
-    assert not len(edge_on(mesh, eye + np.array([0.0, 1e-9, 0.0]), np.array([True])))
+    assert through_eye(mesh, eye, np.array([True])).tolist() == [0, 1]
+    assert not len(through_eye(mesh, eye, np.array([False])))
+    assert not len(through_eye(mesh, eye + np.array([0.0, 1e-9, 0.0]), np.array([True])))
     left, kept = without(mesh, np.array([0]))
     assert kept.tolist() == [1]
     assert len(left.triangles) == len(left.owners) == 1
