@@ -34,10 +34,10 @@ from aliasbench.renderers.raytrace.lanes import (
 from aliasbench.renderers.raytrace.paths import Scattering, make_paths
 from aliasbench.renderers.raytrace.positions import KEY_ROWS, orders_size
 from aliasbench.renderers.raytrace.ray_order import PACKETS, make_block
-from aliasbench.renderers.raytrace.shading import Tables
+from aliasbench.renderers.raytrace.shading import EwaTables, Tables
 from aliasbench.renderers.raytrace.tables import Mesh
 from aliasbench.renderers.raytrace.texturing import CUTOFF
-from aliasbench.renderers.sampling.patterns import Pattern
+from aliasbench.renderers.sampling.patterns import Pattern, RarePattern
 from aliasbench.scenes.model import FloatArray
 
 Kernel = Callable[..., None]
@@ -150,6 +150,9 @@ class PacketEngine:
             from aliasbench.renderers.raytrace.path_kernels import film_paths
 
             kernel, handles = film_paths, (scattering, moving, self._still_handle, self._handles)
+            # the largest kernel, so of all that is rare there is one for both kinds
+            if isinstance(pattern, RarePattern) or isinstance(tables, EwaTables):
+                pattern, tables = RarePattern(*pattern), EwaTables(*tables)
         elif moving:
             handles = (self._still_handle, self._handles)
         self._run(kernel, (*handles, camera, pattern, tables), film.begins.shape[1], film.margin, film, None)

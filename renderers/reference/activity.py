@@ -187,8 +187,8 @@ def mark_row(slices: Slices, s: int, row: int, width: int, marks: Marks) -> None
             _mark_edges(slices, i, length, row, width, marks)
     for k in range(slices.loose_starts[s], slices.loose_starts[s + 1]):
         marks.active[:] = True
-        marks.edges[:] += 2
         for column in range(width):
+            marks.edges[column] += 2
             marks.speed[column] = max(marks.speed[column], slices.loose_speeds[k])
     for second in range(1, count):
         for first_of_two in range(second):
@@ -222,8 +222,8 @@ def _mark_edges(slices: Slices, i: int, length: float, row: int, width: int, mar
         if not speed * length < _FOLLOWED_PX:
             # faster than the margin round the picture allows to follow
             marks.active[:] = True
-            marks.edges[:] += 2
             for column in range(width):
+                marks.edges[column] += 2
                 marks.speed[column] = max(marks.speed[column], speed)
             continue
         # a hair more than the way in half a slice

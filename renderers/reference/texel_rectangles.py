@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from aliasbench.renderers.kernel_parts import allocating, called
+from aliasbench.renderers.kernel_parts import called
 from aliasbench.scenes.model import FloatArray
 
 IntArray = NDArray[np.int64]
@@ -125,7 +125,9 @@ def merge_runs(solid: BoolArray) -> IntArray:
                 continue
             if n == len(out):
                 wider = np.empty((2 * n, 4), np.int64)
-                wider[:n] = out
+                for k in range(n):
+                    for c in range(4):
+                        wider[k, c] = out[k, c]
                 out = wider
             out[n, 0], out[n, 1], out[n, 2], out[n, 3] = row, row + 1, first, column
             ends[first], rectangle[first] = column, n
@@ -164,7 +166,7 @@ def cut_face(corners: FloatArray, rectangles: FloatArray, most: int) -> tuple[Fl
         if box[0] > high[0] or box[1] < low[0] or box[2] > high[1] or box[3] < low[1]:
             continue
         now = 0
-        work[0, :n] = corners
+        _copy(corners, n, work[0], 0)
         size[0] = n
         for side in range(4):
             axis, keep_above = side // 2, side % 2 == 0
@@ -178,20 +180,32 @@ def cut_face(corners: FloatArray, rectangles: FloatArray, most: int) -> tuple[Fl
             break
         if k + size[now] > len(out):
             wider = np.empty((2 * len(out), 5))
-            wider[:k] = out[:k]
+            _copy(out, k, wider, 0)
             out = wider
         if parts + 2 > len(starts):
             longer = np.empty(2 * len(starts), np.int64)
-            longer[: parts + 1] = starts[: parts + 1]
+            for part in range(parts + 1):
+                longer[part] = starts[part]
             starts = longer
-        out[k : k + size[now]] = work[now, : size[now]]
+        _copy(work[now], size[now], out, k)
         k += size[now]
         parts += 1
         starts[parts] = k
     return out[:k], starts[: parts + 1]
 
 
-@allocating
+@called
+def _copy(points: FloatArray, n: int, out: FloatArray, at: int) -> None:
+    """Write the first n corners to `out` from `at` on.
+
+    A loop: assigning an array to a part of another compiles the words that say how their shapes differ, for seconds.
+    """
+    for k in range(n):
+        for c in range(5):
+            out[at + k, c] = points[k, c]
+
+
+@called
 def _cut(points: FloatArray, n: int, axis: int, at: float, keep_above: bool, out: FloatArray) -> int:
     """Write a convex polygon's part on one side of a line of texture space; return its size."""
     size = 0
@@ -199,7 +213,8 @@ def _cut(points: FloatArray, n: int, axis: int, at: float, keep_above: bool, out
         a, b = points[i], points[i + 1 if i + 1 < n else 0]
         da, db = (a[axis] - at, b[axis] - at) if keep_above else (at - a[axis], at - b[axis])
         if da >= 0.0:
-            out[size] = a
+            for c in range(5):
+                out[size, c] = a[c]
             size += 1
         if (da > 0.0 and db < 0.0) or (da < 0.0 and db > 0.0):
             # from the outer end, whichever side asks

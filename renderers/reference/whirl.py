@@ -159,7 +159,8 @@ def _whirl_rows(
                         ringed += 1
                 # lines run along the axis that is more along the radius
                 swap = abs(box[0] + box[1]) < abs(box[2] + box[3])
-                parts[0] = box
+                for c in range(4):
+                    parts[0, c] = box[c]
                 todo, made = 1, 1
                 while todo > 0:
                     todo -= 1

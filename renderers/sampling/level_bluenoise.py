@@ -163,7 +163,8 @@ def _sweep(
         bits &= masks[field]
         if bits == 0:
             continue
-        trial[:] = fields[pixel]
+        for k in range(FIELDS):
+            trial[k] = fields[pixel, k]
         trial[field] ^= bits
         fill_words(trial, words)
         fill_pair(tables, words, count, False, 0, 0, 0, points[0])

@@ -239,7 +239,8 @@ def _sweep(
     for step in range(SIDE * SIDE):
         pixel = int(unit(key, 4 * step) * SIDE * SIDE)
         field = free[int(unit(key, 4 * step + 1) * len(free))]
-        trial[:] = fields[pixel]
+        for k in range(FIELDS):
+            trial[k] = fields[pixel, k]
         trial[field] = int(unit(key, 4 * step + 2) * 65536.0) & masks[field]
         fill_words(trial, words)
         errors(tables, words, count, direction, scale, mean, turn, points, new)

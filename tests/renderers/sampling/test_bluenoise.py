@@ -42,7 +42,7 @@ ANGLES_DEG = (21.6, 45.0, 111.6)
 DRAWS = 50_000
 
 
-@njit
+@njit(cache=True)
 def _picture(tables: WordArray, tile: Tile, count: int, start: int, size: int, pair: int) -> FloatArray:
     out = np.empty((size, size, count, 2))
     for row in range(size):
@@ -57,18 +57,24 @@ def picture(tile: Tile, count: int, *, seed: int, pair: int, size: int = SIZE) -
     return points
 
 
-@njit
-def _seeds(tables: WordArray, tile: Tile, count: int, out: FloatArray) -> None:
+@njit(cache=True)
+def _seeds(
+    tables: WordArray, tile: Tile, count: int, starts: NDArray[np.int64], column: int, row: int, out: FloatArray
+) -> None:
+    points = np.empty((count, 2))  # contiguous, and all arguments of the types that `_picture` compiles it for
     for seed in range(len(out)):
         for pair in range(3):
-            fill_pixel(tables, tile, count, frame_key(seed, 0), 5, 9, pair, out[seed, :, 2 * pair : 2 * pair + 2])
+            fill_pixel(tables, tile, count, starts[seed], column, row, pair, points)
+            for k in range(count):
+                out[seed, k, 2 * pair], out[seed, k, 2 * pair + 1] = points[k, 0], points[k, 1]
 
 
 @cache
 def one_pixel(count: int) -> FloatArray:
     """Points (DRAWS, sample, 6) of one pixel under many seeds: x, y, u, v, and those of the third pair."""
     out = np.empty((DRAWS, count, 6))
-    _seeds(sobol_tables(), bluenoise_tile(count), count, out)
+    starts = np.array([frame_key(seed, 0) for seed in range(DRAWS)], np.int64)
+    _seeds(sobol_tables(), bluenoise_tile(count), count, starts, 5, 9, out)
     return out
 
 
@@ -84,8 +90,9 @@ def random_tile(seed: int) -> Tile:
     """A tile of keys as `make_bluenoise` has them before it starts."""
     fields = np.random.default_rng(seed).integers(0, 1 << 16, (SIDE * SIDE, FIELDS), dtype=np.uint16)
     fields[:, 4:-1] &= np.uint16(OWN)
-    words: Tile = tile_words(fields)
-    return words.reshape(SIDE, SIDE, WORDS)
+    words: Tile = tile_words(fields).reshape(SIDE, SIDE, WORDS)
+    words.setflags(write=False)  # as the sampler's own are, which is a type of its own to the compiler
+    return words
 
 
 def half_plane_area(normal: FloatArray, slope: FloatArray) -> Callable[[FloatArray], FloatArray]:
