@@ -10,6 +10,7 @@ parallel rays alike. A world point at (X, Y, Z) is therefore seen from there whe
 origin + a right + b up whose axes are right + (a / F) forward and up + (b / F) forward (`lens_view`).
 """
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -92,16 +93,17 @@ def view_at(camera: Camera, animation: Animation, frame: int, fraction: float, s
     target_velocity = velocity if camera.target_velocity is None else np.asarray(camera.target_velocity)
     origin = np.asarray(camera.position, dtype=np.float64) + velocity * t
     axis = np.asarray(camera.target, dtype=np.float64) - np.asarray(camera.position) + (target_velocity - velocity) * t
-    length = float(np.linalg.norm(axis))
+    length = math.sqrt(axis.dot(axis))
     if not length > 0.0:
         raise InputError(f"camera: position equals target at t = {t:g} s; they must differ")
     forward = axis / length
-    right = np.cross(forward, np.asarray(camera.up, dtype=np.float64))
-    norm = float(np.linalg.norm(right))
-    if not norm > 1e-12 * float(np.linalg.norm(camera.up)):
+    hint = np.asarray(camera.up, dtype=np.float64)
+    right = _cross(forward, hint)
+    norm = math.sqrt(right.dot(right))
+    if not norm > 1e-12 * math.sqrt(hint.dot(hint)):
         raise InputError(f"camera: up {list(camera.up)} is along the viewing axis; it must not be")
     right = right / norm
-    up = np.cross(right, forward)
+    up = _cross(right, forward)
     if camera.projection == "orthographic":
         if camera.height is None:
             raise InputError("camera: an orthographic camera needs height (world units from bottom to top)")
@@ -111,6 +113,15 @@ def view_at(camera: Camera, animation: Animation, frame: int, fraction: float, s
             raise InputError("camera: a perspective camera needs fov_y_deg (degrees from bottom to top)")
         scale = height / 2 / np.tan(np.radians(camera.fov_y_deg) / 2)
     return View(origin, right, up, forward, camera.projection == "perspective", float(scale), width, height)
+
+
+def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Return the vector product of two vectors (3,): numpy's, bit for bit, in a tenth of its time.
+
+    Every accumulation pass asks for a view, which took longer than drawing small pictures.
+    """
+    (ax, ay, az), (bx, by, bz) = a.tolist(), b.tolist()
+    return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
 
 
 def focus_at(camera: Camera, animation: Animation, frame: int, fraction: float) -> float:
