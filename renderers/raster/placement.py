@@ -90,6 +90,8 @@ def body_matrices(
 
 def _rotations(p: Placement, animation: Animation, frame: int, fraction: float) -> FloatArray:
     """Return (n, 3, 3) rotations; quarter turns are taken off in revolutions and are exact."""
+    if not p.rates.any():
+        return np.repeat(np.eye(3)[None], len(p.bodies), axis=0)  # what the rest comes to, too, for each of many passes
     per_frame = p.rates / animation.fps
     turns = np.fmod(per_frame * frame, 1.0) + per_frame * fraction
     reduced = turns - np.round(turns)
