@@ -4,7 +4,8 @@ HYPOTHESIS_PROFILE=explore draws new ones, many more of them.
 
 The rest is about time. Thousands of tests and what numba knows are never garbage, and looking through them for some
 was a tenth of compiling. Runs are written to memory where there is plenty: waiting for a disk proves nothing here. With
-several processes the long files come first, so that none is begun when all else is done.
+several processes the long files come first, so that none is begun when all else is done, and Mesa draws on one thread
+in each: waking others for pictures this small costs more than they take over, and what is drawn does not depend on it.
 """
 
 import gc
@@ -66,6 +67,8 @@ _LONG = [
 def pytest_configure(config: pytest.Config) -> None:
     config.option.loadscopereorder = False  # files of many tests are not those that take long
     gc.set_threshold(50_000, 10, 10)
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        os.environ.setdefault("LP_NUM_THREADS", "1")
     if _MEMORY.is_dir() and os.access(_MEMORY, os.W_OK) and shutil.disk_usage(_MEMORY).free > _ROOM:
         os.environ.setdefault("PYTEST_DEBUG_TEMPROOT", str(_MEMORY))
 
