@@ -57,10 +57,12 @@ class Verdict:
 
     @property
     def outcome(self) -> Outcome:
-        """Return "ok", "limit" or "failed"; a figure that is not finite or known too badly has failed."""
-        if not (math.isfinite(self.measured) and self.measured >= 0.0 and 0.0 <= self.rounding <= self.bound):
+        """Return "ok", "limit" or "failed"; a figure or bound that is not finite, or known too badly, fails."""
+        if not (
+            math.isfinite(self.measured) and self.measured >= 0.0 and 0.0 <= self.rounding <= self.bound < math.inf
+        ):
             return "failed"
-        if self.standard_error is not None and not self.standard_error <= LARGEST_STANDARD_ERROR:
+        if self.standard_error is not None and not 0.0 <= self.standard_error <= LARGEST_STANDARD_ERROR:
             return "failed"
         if self.measured <= self.rounding:
             return "ok"

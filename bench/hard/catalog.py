@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from aliasbench.bench.hard import (
     coordinates,
     coplanar,
+    degenerate,
     depth,
     edges,
     footprints,
@@ -27,6 +28,7 @@ _GROUPS = (
     shared_edges.CASES,
     texel_lines.CASES,
     shapes.CASES,
+    degenerate.CASES,
     coplanar.CASES,
     viewpoints.CASES,
     scale.CASES,

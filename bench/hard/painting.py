@@ -22,7 +22,6 @@ RAY_ROUNDINGS = 8.0
 TIE_PX = 1e-12  # the truth's own rounding: nearer to an edge a sample is on it, and either side's
 SNAPPED_PX = math.sqrt(2.0) / 512.0  # 8 subpixel bits: by half a step of 1/256 px, right and down
 SNAPPED = "8 subpixel bits: corners snap to 1/256 px, by at most half a step right and half a step down"
-RAYS = "float32 rays: 8 roundings of 2^-24 of the distance to the corner, seen from the distance to the edge"
 _COLOR_TOLERANCE = 1e-5  # float32 pixels hold the scenes' colours to 6e-8
 _WIDER = 4.0  # pictures: to where polygons are cut
 _NOWHERE_PX, _TOUCHING_PX = 1e9, 1e-300
@@ -121,14 +120,14 @@ def paint(
     for number in range(len(scene.objects)) if order is None else order:
         surface = scene.objects[number]
         matrix = object_matrix(surface.motion, scene.animation, frame, fraction)
-        outline = _project(view, surface.vertices @ matrix[:3, :3].T + matrix[:3, 3])
+        outline = outline_seen(view, surface.vertices @ matrix[:3, :3].T + matrix[:3, 3])
         if len(outline) > 2:
             outlines.append(outline)
             colors.append(surface.color)
     return Painting(size, tuple(outlines), tuple(colors), scene.background)
 
 
-def _project(view: View, corners: FloatArray) -> FloatArray:
+def outline_seen(view: View, corners: FloatArray) -> FloatArray:
     """Return (n, 2): an outline in pixels, without what is behind the camera or far outside of the picture."""
     local = view.to_camera(corners)
     wide = _WIDER * max(view.width, view.height) / view.scale
@@ -163,7 +162,7 @@ def _cut(corners: FloatArray, distance: FloatArray) -> FloatArray:
 
 
 def ray_bound_px(scene: Scene, size: tuple[int, int], *, frame: int = 0, fraction: float = 0.0) -> float:
-    """Return by how many pixels float32 rays may misplace an edge of a scene.
+    """Return by how many pixels float32 rays may misplace an edge of a scene, by a count of roundings; see also `rays`.
 
     A corner, the ray's origin and its direction are rounded to float32, and the edge test's products and sums of three
     terms are five more roundings: together `RAY_ROUNDINGS` half ulps of the largest coordinate relative to the eye, or

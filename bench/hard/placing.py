@@ -7,14 +7,21 @@ A pixel is a world unit wide at z = 0, which a camera at z = 48 looks at. All bo
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
 
-from aliasbench.bench.hard.case import RASTERS, REFERENCE, Verdict, samples_key, with_keys
-from aliasbench.bench.hard.painting import RAYS, SNAPPED, SNAPPED_PX, TIE_PX, Painting, paint, ray_bound_px
+from aliasbench.bench.hard.aiming import aimed
+from aliasbench.bench.hard.case import FAST, RASTERS, REFERENCE, Verdict, samples_key, with_keys
+from aliasbench.bench.hard.edge_pictures import PERMANENT, worst_of
+from aliasbench.bench.hard.ownership import distance_to_outline, pixel_points
+from aliasbench.bench.hard.painting import SNAPPED, SNAPPED_PX, TIE_PX, Painting, outline_seen, paint, ray_bound_px
+from aliasbench.bench.hard.rays import WHY, WHY_FAST, ray_bound, truth_bound
 from aliasbench.renderers.catalog import render
 from aliasbench.scenes.model import Animation, Camera, FloatArray, Motion, Scene, Spin, Surface, Vec3
+from aliasbench.scenes.motion import object_matrix
+from aliasbench.scenes.projection import view_at
 from aliasbench.scenes.shapes import polygon
 
 SIZE = (36, 24)
@@ -29,6 +36,11 @@ PROJECTIONS: tuple[Projection, ...] = ("orthographic", "perspective")
 MOVING_FRAME = 7
 ANIMATION = Animation(fps=30.0, frames=20, shutter=0.5)
 MIDDLE_S = (MOVING_FRAME + ANIMATION.shutter / 2.0) / ANIMATION.fps  # of that frame's shutter
+# What is cut lies between planes at distances d and 8 d, d being at least the picture's width or how far the edge is:
+# its corners are at most 8 sqrt(3) d away, which bounds what `rays` adds up, 6 roundings and 7 of 1.155 |e| |s|, of
+# which a pixel is seen at `DISTANCE`, off the axis 1.2 times as large.
+CUT_PX = (6.0 + 7.0 * PERMANENT) * 2.0**-24 * 8.0 * math.sqrt(3.0) * 1.2 * DISTANCE
+CUT = "parts cut in float64 reach at most 8 sqrt(3) times as far as they are"
 SHOWN = "A sample at a pixel's centre shows what is there; where it does not, that is within the format's rounding."
 
 
@@ -46,6 +58,11 @@ class Setting:
     def fraction(self) -> float:
         """Of the frame interval: the shutter's middle, at which moving scenes are looked at."""
         return self.scene.animation.shutter / 2.0
+
+    @property
+    def timed(self) -> str:
+        """What a technique needs besides to look at the shutter's middle."""
+        return "" if self.scene.is_static else "time=center"
 
     def painting(self) -> Painting:
         """Return what is true."""
@@ -83,35 +100,97 @@ def flown(scene: Scene, step: Vec3) -> Scene:
 
 
 def misplaced(
-    subject: str, settings: Iterable[Setting], *, bound_px: float | None = None, reach_px: float = 0.0
+    subject: str,
+    settings: Iterable[Setting],
+    *,
+    aim: int = 0,
+    cut: bool = False,
+    reach_px: float = 0.0,
+    near_px: float = 0.0,
 ) -> Verdict:
     """Return how far a subject misplaces what samples at pixel centres see; of the reference, its coverage's error.
 
-    `bound_px` replaces a tracer's bound. `reach_px`: how far out float64 coordinates of the truth are.
+    Parameters
+    ----------
+    aim : int
+        At how many samples of each setting edges are aimed besides, see `aiming`; none with a `truth` of its own.
+    cut : bool
+        A tracer cuts in float64 what float32 would misplace by more than 1/256 px.
+    reach_px : float
+        How far out float64 coordinates of the truth are.
+    near_px : float
+        By how much a cut at the reference's near plane moves in the picture.
     """
-    found: dict[str, float] = {}
-    bound, wrong, why = 0.0, 0, ""
-    for setting in settings:
-        scene, painting = setting.scene, setting.painting()
-        timed = "time=center" if not scene.is_static else ""
-        if subject == REFERENCE:
-            frame = render(scene, with_keys(subject, timed), size=SIZE, frame=setting.frame)
-            found[setting.name] = float(np.abs(frame.pixels - painting.coverage()).max())
-            # the truth's own roundings: 8 of float64 of its largest coordinate, of which an edge's area is at most 2
-            own = 16.0 * 2.0**-53 * max(reach_px, 1e3)
-            bound = max(bound, (frame.uncertainty or 0.0) + own)
-            why = "its own bound, and 16 roundings of float64 of the outlines compared with"
-            continue
-        shown = render(scene, samples_key(subject, 1, timed), size=SIZE, frame=setting.frame).pixels
-        apart = painting.apart(shown)
-        found[setting.name] = float(apart.max())
-        wrong += int((apart > TIE_PX).sum())
-        if subject in RASTERS:
-            bound, why = SNAPPED_PX, SNAPPED
-        else:
-            own = ray_bound_px(scene, SIZE, frame=setting.frame, fraction=setting.fraction)
-            bound, why = max(bound, own if bound_px is None else bound_px), RAYS
-    listed = ", ".join(f"{name} {value:.1e}" for name, value in found.items())
-    if subject == REFERENCE:
-        return Verdict(max(found.values()), "contrast", bound, bound, why, note=listed)
-    return Verdict(max(found.values()), "px", TIE_PX, bound, why, note=f"{wrong} samples off; {listed}")
+    judged = [
+        _covered(subject, setting, reach_px, near_px)
+        if subject == REFERENCE
+        else _sampled(subject, setting, aim, cut, reach_px)
+        for setting in settings
+    ]
+    worst = worst_of([verdict for verdict, _, _ in judged])
+    wrong, pictures = sum(number for _, number, _ in judged), sum(number for _, _, number in judged)
+    more = "" if subject == REFERENCE else f"; {wrong} samples of {pictures} pictures are off"
+    return replace(worst, note=f"{worst.note}{more}")
+
+
+def _covered(subject: str, setting: Setting, reach_px: float, near_px: float) -> tuple[Verdict, int, int]:
+    """Return the verdict on a reference's coverage, and two numbers that mean nothing."""
+    frame = render(setting.scene, with_keys(subject, setting.timed), size=SIZE, frame=setting.frame)
+    error = float(np.abs(frame.pixels - setting.painting().coverage()).max())
+    # the truth's own roundings: 8 of float64 of its largest coordinate, of which an edge's area is at most 2
+    bound = (frame.uncertainty or 0.0) + 16.0 * 2.0**-53 * max(reach_px, 1e3) + 2.0 * near_px
+    why = "its own bound, and 16 roundings of float64 of the outlines compared with"
+    return Verdict(error, "contrast", bound, bound, why, note=setting.name), 0, 1
+
+
+def _sampled(subject: str, setting: Setting, aim: int, cut: bool, reach_px: float) -> tuple[Verdict, int, int]:
+    """Return the verdict on single samples, how many are wrong, and of how many pictures."""
+    bound, exact = _bounds(setting)
+    apart = np.array([_apart(subject, each, painting) for each, painting in _pictures(setting, aim)])
+    if subject in RASTERS:
+        bound, why = SNAPPED_PX, SNAPPED
+    else:
+        why = WHY_FAST if subject == FAST else WHY
+        if cut and bound > CUT_PX:
+            bound, why = CUT_PX, f"{CUT}; {why}"
+        elif reach_px:
+            # depths of one plane decide at its horizon which polygon is seen: their rounding tilts it
+            own = ray_bound_px(setting.scene, SIZE, frame=setting.frame, fraction=setting.fraction)
+            bound = max(bound, own)
+    verdict = Verdict(float(apart.max()), "px", exact, max(bound, exact), why, note=setting.name)
+    return verdict, int((apart > exact).sum()), len(apart)
+
+
+@lru_cache(maxsize=512)
+def _bounds(setting: Setting) -> tuple[float, float]:
+    """Return by how many pixels float32 rays may misplace what is seen, and float64 the truth."""
+    scene, frame, fraction = setting.scene, setting.frame, setting.fraction
+    exact = truth_bound(scene, SIZE, frame=frame, fraction=fraction)
+    return ray_bound(scene, SIZE, frame=frame, fraction=fraction), max(TIE_PX, exact)
+
+
+@lru_cache(maxsize=512)  # one after the other, all subjects of a case are held to the same truth
+def _pictures(setting: Setting, aim: int) -> tuple[tuple[Setting, Painting], ...]:
+    """Return a setting and the same with the camera aimed, each with what is true of it."""
+    scenes = [setting.scene]
+    if aim:
+        scenes += aimed(setting.scene, lambda scene: replace(setting, scene=scene).painting(), aim)
+    settings = (replace(setting, scene=scene) for scene in scenes)
+    return tuple((each, each.painting()) for each in settings)
+
+
+def _apart(subject: str, setting: Setting, painting: Painting) -> FloatArray:
+    """Return (h w,): how far each sample is from what it shows; the fast test may see through between triangles."""
+    shown = render(setting.scene, samples_key(subject, 1, setting.timed), size=SIZE, frame=setting.frame).pixels
+    apart = painting.apart(shown)
+    wrong = np.flatnonzero(apart > TIE_PX)
+    if subject == FAST and len(wrong):
+        points = pixel_points(SIZE)[wrong]
+        view = view_at(setting.scene.camera, setting.scene.animation, setting.frame, setting.fraction, SIZE)
+        for surface in setting.scene.objects:
+            matrix = object_matrix(surface.motion, setting.scene.animation, setting.frame, setting.fraction)
+            corners = (surface.vertices @ matrix[:3, :3].T + matrix[:3, 3])[surface.triangles]
+            for outline in (outline_seen(view, triangle) for triangle in corners):
+                if len(outline):
+                    apart[wrong] = np.minimum(apart[wrong], np.maximum(distance_to_outline(points, outline), TIE_PX))
+    return apart

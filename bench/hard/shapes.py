@@ -1,13 +1,14 @@
-"""Shapes that are hard for their own sake: slivers, triangles without area, many vertices, sizes beyond the view."""
+"""Shapes that are hard for their own sake: slivers, many vertices, sizes beyond the view."""
 
 import math
-import tempfile
 from collections.abc import Iterable
-from pathlib import Path
+from functools import lru_cache
 
 import numpy as np
 
-from aliasbench.bench.hard.case import REFERENCE, HardCase, Verdict, samples_key, with_keys
+from aliasbench.bench.hard.case import RASTERS, REFERENCE, RENDERERS, HardCase, Verdict, samples_key, with_keys
+from aliasbench.bench.hard.edge_pictures import worst_of
+from aliasbench.bench.hard.painting import SNAPPED, SNAPPED_PX, TIE_PX, paint
 from aliasbench.bench.hard.placing import (
     BLUE,
     GREEN,
@@ -20,14 +21,15 @@ from aliasbench.bench.hard.placing import (
     Setting,
     camera,
     flat,
+    flown,
     misplaced,
     moved,
 )
+from aliasbench.bench.hard.rays import WHY, ray_bound
 from aliasbench.renderers.catalog import prepare, render
-from aliasbench.scenes.errors import InputError
-from aliasbench.scenes.meshes import load_mesh
-from aliasbench.scenes.model import FloatArray, Scene, Surface
-from aliasbench.scenes.shapes import mesh, polygon
+from aliasbench.renderers.sampling.patterns import sample_set
+from aliasbench.scenes.model import FloatArray, Scene
+from aliasbench.scenes.shapes import mesh
 
 _SEEDS, _SAMPLES = 16, 16
 _MOST_ERRORS = 4.5  # standard errors, of 15 degrees of freedom: one in 2400 by chance, and no seed here is chance
@@ -100,101 +102,6 @@ def _sliver_samples(subject: str) -> Verdict:
     return misplaced(subject, sliver_settings())
 
 
-SOUND = np.array([(-9.5, -7.5, 0.0), (10.5, -6.5, 0.0), (8.5, 8.5, 0.0), (-8.0, 7.0, 0.0)])
-# without area: two corners in one vertex, in one place, three in a row; and one again in either sense
-_WHISKERS = np.array(
-    [(-9.5, -7.5, 0.0), (-16.5, 0.5, 0.0), (-12.5, 0.5, 0.0), (16.5, 0.5, 0.0), (-16.5, 0.5, 0.0), (0.1, 0.3, 0.0),
-     (0.1 + 1.1 / 3.0, 0.3 + 0.7 / 3.0, 0.0), (1.2, 1.0, 0.0), (4.5, 11.5, 0.0), (4.5, -11.5, 0.0), (4.5, 9.5, 0.0)]
-)  # fmt: skip
-_TRIANGLES = [(0, 1, 2), (0, 2, 3)]
-_ADDED = [(0, 1, 1), (2, 2, 2), (4, 0, 1), (5, 6, 7), (8, 5, 7), (9, 10, 11), (12, 13, 14), (0, 1, 2), (2, 1, 0)]
-
-
-def _pictures(subject: str, scene: Scene, frame: int = 0) -> tuple[FloatArray, float]:
-    """Return a picture as exact as the subject makes one cheaply, and its uncertainty."""
-    technique = with_keys(subject, "") if subject == REFERENCE else samples_key(subject, 4)
-    shown = render(scene, technique, size=SIZE, frame=frame)
-    return np.asarray(shown.pixels, dtype=np.float64), shown.uncertainty or 0.0
-
-
-def _alike(subject: str, pairs: Iterable[tuple[str, Scene, Scene]], why: str) -> Verdict:
-    """Return by how much the second scene of each pair is shown otherwise than the first."""
-    found, bound = {}, 0.0
-    for name, clean, odd in pairs:
-        (ours, known), (theirs, other) = (_pictures(subject, s, MOVING_FRAME) for s in (clean, odd))
-        if not 0.05 < float(ours.mean()) < 0.95:
-            return Verdict(math.inf, "contrast", 0.0, 0.0, why, note=f"{name}: the clean picture shows nothing")
-        found[name] = float(np.abs(ours - theirs).max())
-        bound = max(bound, known + other)
-    listed = ", ".join(f"{name} {value:.1e}" for name, value in found.items())
-    return Verdict(max(found.values()), "contrast", bound, bound, why, note=listed)
-
-
-def degenerate_meshes() -> tuple[Surface, Surface]:
-    """Return a mesh of two triangles, and the same with triangles without area and ones that are there twice."""
-    clean = mesh(SOUND, _TRIANGLES, color=GREEN)
-    return clean, mesh(np.concatenate([SOUND, _WHISKERS]), _TRIANGLES[:1] + _ADDED + _TRIANGLES[1:], color=GREEN)
-
-
-def _degenerate_triangles(subject: str) -> Verdict:
-    clean, odd = degenerate_meshes()
-    pairs: list[tuple[str, Scene, Scene]] = []
-    for projection in PROJECTIONS:
-        plain, other = (Scene("mesh", camera(projection), (s,)) for s in (clean, odd))
-        pairs += [(projection, plain, other), (f"{projection} turning", moved(plain), moved(other))]
-    return _alike(subject, pairs, "a triangle without area covers nothing, one that is there twice covers what it did")
-
-
-def _degenerate_files(subject: str) -> Verdict:
-    clean, odd = degenerate_meshes()
-    texts = {
-        "obj": "\n".join(
-            [*(f"v {x!r} {y!r} {z!r}" for x, y, z in odd.vertices.tolist()), "usemtl none"]
-            + [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in odd.triangles.tolist()]
-        ),
-        "ply": "\n".join(
-            ["ply", "format ascii 1.0", f"element vertex {len(odd.vertices)}"]
-            + [f"property double {axis}" for axis in "xyz"]
-            + [f"element face {len(odd.triangles)}", "property list uchar int vertex_indices", "end_header"]
-            + [f"{x!r} {y!r} {z!r}" for x, y, z in odd.vertices.tolist()]
-            + [f"3 {a} {b} {c}" for a, b, c in odd.triangles.tolist()]
-        ),
-    }
-    pairs = []
-    with tempfile.TemporaryDirectory() as folder:
-        for suffix, text in texts.items():
-            path = Path(folder, f"odd.{suffix}")
-            path.write_text(text + "\n")
-            surfaces = load_mesh(path).surfaces
-            color = surfaces[0].color
-            for projection in PROJECTIONS:
-                own = mesh(clean.vertices, clean.triangles, color=color)
-                scenes = [Scene("mesh", camera(projection), objects) for objects in ((own,), surfaces)]
-                pairs.append((f"{suffix} {projection}", scenes[0], scenes[1]))
-    return _alike(subject, pairs, "a file's triangles without area, and its second copies, cover nothing more")
-
-
-def _duplicate_vertices(subject: str) -> Verdict:
-    """Triangles of a fan that share vertices, and the same with vertices of their own."""
-    angles = 0.1 + 2.0 * np.pi * np.arange(11) / 11
-    rim = np.c_[10.5 * np.cos(angles), 10.5 * np.sin(angles), np.zeros(11)]
-    points = np.concatenate([[(0.5, 0.5, 0.0)], rim])
-    triangles = np.array([(0, 1 + k, 1 + (k + 1) % 11) for k in range(11)])
-    shared = mesh(points, triangles, color=GREEN)
-    apart = mesh(points[triangles].reshape(-1, 3), np.arange(33).reshape(-1, 3), color=GREEN)
-    pairs: list[tuple[str, Scene, Scene]] = []
-    for projection in PROJECTIONS:
-        plain, other = (Scene("fan", camera(projection), (s,)) for s in (shared, apart))
-        pairs += [(projection, plain, other), (f"{projection} turning", moved(plain), moved(other))]
-    verdict = _alike(subject, pairs, "vertices in one place are rounded alike, whether they are one or several")
-    try:
-        polygon([(0, 0, 0), (1, 0, 0), (1, 0, 0), (0, 1, 0)])
-    except InputError as error:
-        if "points 1 and 2 are the same" in str(error):
-            return verdict
-    return Verdict(1.0, "contrast", 0.0, 0.0, "a polygon that repeats a vertex is refused and names it")
-
-
 def ring_outlines() -> dict[str, FloatArray]:
     """Return outlines (n, 2): a circle of 1000 corners, a concave star of 1000, and one with corners in a row."""
     angles = 2.0 * np.pi * np.arange(1000) / 1000
@@ -208,14 +115,20 @@ def ring_outlines() -> dict[str, FloatArray]:
     return {"circle": 10.7 * circle, "star": radius[:, None] * circle, "rows": rows}
 
 
-def _many_vertices(subject: str) -> Verdict:
+@lru_cache(maxsize=1)
+def ring_settings() -> list[Setting]:
+    """Return the rings, still and turning."""
     still = [
         Setting(f"{name} {projection}", Scene("many", camera(projection), (flat(outline, ORANGE),)))
         for name, outline in ring_outlines().items()
         for projection in PROJECTIONS
     ]
     turning = [Setting(f"{s.name} turning", moved(s.scene), frame=MOVING_FRAME) for s in still]
-    return misplaced(subject, still + turning)
+    return still + turning
+
+
+def _many_vertices(subject: str) -> Verdict:
+    return misplaced(subject, ring_settings(), aim=1)
 
 
 def huge_scene(projection: Projection, times: float) -> Scene:
@@ -233,14 +146,46 @@ def huge_scene(projection: Projection, times: float) -> Scene:
     return Scene("huge", camera(projection), (flat(sheet, (0.1, 0.1, 0.1)), *objects))
 
 
+@lru_cache(maxsize=2)
+def huge_settings(most: float = _LARGEST) -> list[Setting]:
+    """Return scenes that reach 100 to `most` times the view's width, still, turning, and with a camera that flies."""
+    out = []
+    for projection in PROJECTIONS:
+        for times in (1e2, 1e4, _LARGEST):
+            if times <= most:
+                name, scene = f"{projection} 1e{math.log10(times):.0f}", huge_scene(projection, times)
+                out.append(Setting(name, scene))
+                out.append(Setting(f"{name} turning", moved(scene), frame=MOVING_FRAME))
+                out.append(Setting(f"{name} flying", flown(scene, (0.5, 0.25, -4.0)), frame=MOVING_FRAME))
+    return out
+
+
 def _huge_polygon(subject: str) -> Verdict:
-    settings = [
-        Setting(f"{projection} 1e{math.log10(times):.0f}", huge_scene(projection, times))
-        for projection in PROJECTIONS
-        for times in (1e2, 1e4, _LARGEST)
-    ]
-    # what float32 would misplace by more is cut in float64 first
-    return misplaced(subject, settings, bound_px=2.0**-8, reach_px=2.0 * _LARGEST * SIZE[0])
+    return misplaced(subject, huge_settings(), aim=1, cut=True, reach_px=2.0 * _LARGEST * SIZE[0])
+
+
+def _huge_exposed(subject: str) -> Verdict:
+    """Samples at other places and times, one of each a picture, while the shutter is open."""
+    found = []
+    for setting in huge_settings():
+        scene, wrong, worst = setting.scene, 0, 0.0
+        if scene.is_static:
+            continue
+        keys = "sampler=random" if subject in RASTERS else "sampler=random,pattern=shared"
+        with prepare(scene, with_keys(subject, keys), size=SIZE) as prepared:
+            for seed in range(_SEEDS):
+                x, y, time = sample_set("random", 1, seed=seed, frame=setting.frame)[0, :3]
+                shown = prepared.render(frame=setting.frame, seed=seed).pixels
+                painting = paint(scene, SIZE, frame=setting.frame, fraction=time * scene.animation.shutter)
+                apart = painting.apart(shown, x, y)
+                worst, wrong = max(worst, float(apart.max())), wrong + int((apart > 0.0).sum())
+        if subject in RASTERS:
+            bound, why = SNAPPED_PX, SNAPPED
+        else:
+            bound = ray_bound(scene, SIZE, frame=setting.frame, fraction=setting.fraction)
+            why = f"{WHY}; what moves while the shutter is open is traced whole"
+        found.append(Verdict(worst, "px", TIE_PX, bound, why, note=f"{setting.name}; {wrong} samples off"))
+    return worst_of(found)
 
 
 CASES = (
@@ -259,38 +204,27 @@ CASES = (
         _sliver_samples,
     ),
     HardCase(
-        "degenerate-triangles",
-        "shapes",
-        "A mesh with triangles of no area, on lines through pixel centres, and with triangles that are there twice.",
-        "The picture is the one without them.",
-        _degenerate_triangles,
-    ),
-    HardCase(
-        "degenerate-files",
-        "shapes",
-        "An OBJ and a PLY file with triangles of no area, triangles that are there twice, and unused vertices.",
-        "The picture is the one without them.",
-        _degenerate_files,
-    ),
-    HardCase(
-        "duplicate-vertices",
-        "shapes",
-        "Triangles meet in vertices of their own at one place, instead of sharing one; a polygon repeats one.",
-        "The picture is the one with shared vertices; the polygon is refused with the two points' numbers.",
-        _duplicate_vertices,
-    ),
-    HardCase(
         "many-vertices",
         "shapes",
-        "Polygons of 1000 corners, convex and concave, and a concave one of 280 of which most lie on straight sides.",
+        "Polygons of 1000 corners, convex and concave, and a concave one of 280 of which most lie on straight sides; "
+        "edges also 2^-10 to 2^-22 px from samples.",
         SHOWN,
         _many_vertices,
     ),
     HardCase(
         "huge-polygon",
         "shapes",
-        "Strips and a sheet that reach 100, 10 000 and 1 000 000 times the view's width, their edges in view.",
-        "An edge is where it is to 1/256 px under rays (cut in float64), and to the rasterizer's subpixel step.",
+        "Strips and a sheet that reach 100, 10 000 and 1 000 000 times the view's width, their edges in view "
+        "and also 2^-10 to 2^-22 px from samples; still, turning, and with a camera that flies.",
+        "An edge is where it is to the rounding of parts cut in float64 under rays, or to a rasterizer's subpixel.",
         _huge_polygon,
+    ),
+    HardCase(
+        "huge-polygon-exposed",
+        "shapes",
+        "The same strips turn, or the camera flies by, while the shutter is open: pictures of samples at 16 instants.",
+        "A sample shows what is there at its instant. The reference has no samples: it is asked in huge-polygon.",
+        _huge_exposed,
+        RENDERERS,
     ),
 )

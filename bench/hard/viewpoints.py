@@ -4,6 +4,7 @@ A polygon that reaches behind the camera shows the part before it; one whose pla
 """
 
 import math
+from functools import lru_cache
 
 import numpy as np
 
@@ -22,9 +23,12 @@ from aliasbench.bench.hard.placing import (
     flat,
     flown,
     misplaced,
+    moved,
 )
 from aliasbench.scenes.model import Camera, Scene, Surface, Vec3
 from aliasbench.scenes.shapes import polygon
+
+_AIM = 2
 
 
 def _behind() -> tuple[Surface, ...]:
@@ -38,7 +42,10 @@ def passing_settings() -> list[Setting]:
     """Return floors and walls that run from before the camera past it to behind it, with others wholly behind."""
     floor = polygon([(-7.3, -3.1, -900.0), (9.1, -3.1, -900.0), (9.1, -3.1, 200.0), (-7.3, -3.1, 200.0)], color=ORANGE)
     wall = polygon([(5.3, -2.9, -300.0), (5.3, 14.0, -300.0), (5.3, 11.0, 300.0), (5.3, -2.9, 300.0)], color=BLUE)
-    slab = polygon([(-30.0, -9.0, 20.0), (30.0, 33.0, 100.0), (-44.0, 51.0, 100.0)], color=GREEN)
+    slabs = {
+        "orthographic": polygon([(-30.0, -9.0, 20.0), (30.0, 33.0, 100.0), (-44.0, 51.0, 100.0)], color=GREEN),
+        "perspective": polygon([(-5.0, -3.1, 20.0), (5.5, 1.7, 25.0), (-44.0, 51.0, 100.0)], color=GREEN),
+    }
     views = {"straight": (0.3, 0.2, 0.0), "leaning": (2.3, -1.7, 0.0)}
     out = []
     for projection in PROJECTIONS:
@@ -46,19 +53,25 @@ def passing_settings() -> list[Setting]:
             view = camera(projection, target=target)
             # from above the floor, as a pinhole is, it hides nothing of the wall
             walls = (("walls", (floor, wall)),) if projection == "perspective" else ()
-            for what, objects in (("floor", (floor,)), *walls, ("slab", (slab,))):
+            for what, objects in (("floor", (floor,)), *walls, ("slab", (slabs[projection],))):
                 scene = Scene("passing", view, (*_behind(), *objects))
                 # those behind the camera are painted nowhere
                 out.append(Setting(f"{projection} {name} {what}", scene))
     return out
 
 
-def _passing(subject: str) -> Verdict:
+@lru_cache(maxsize=1)
+def _flown_by() -> list[Setting]:
     still = passing_settings()
-    flying = [
+    return still + [
         Setting(f"{s.name} flying", flown(s.scene, (0.5, 0.25, -4.0)), s.order, frame=MOVING_FRAME) for s in still
     ]
-    return misplaced(subject, still + flying)
+
+
+def _passing(subject: str) -> Verdict:
+    # the reference's near plane for parallel rays is 1e-14 of the largest coordinate, under 1e3, behind the camera, and
+    # slabs, which it cuts, rise by half
+    return misplaced(subject, _flown_by(), aim=_AIM, near_px=1e-14 * 1e3)
 
 
 def _edge_on(subject: str) -> Verdict:
@@ -78,7 +91,16 @@ def _edge_on(subject: str) -> Verdict:
                 view = camera(projection, position, target)
                 scene = Scene("edge-on", view, (behind, *sheets))
                 truth = Scene("edge-on", view, (behind,))
-                settings.append(Setting(f"{projection} {angle:.1f} from {position[0]:g}", scene, truth=truth))
+                name = f"{projection} {angle:.1f} from {position[0]:g}"
+                settings.append(Setting(name, scene, truth=truth))
+                # the sheets' planes stay the camera's: it flies along its axis, or all turn about the axis
+                way = -7.0 * axis if position[0] else np.array([0.0, 0.0, -7.0])
+                step = (float(way[0]), float(way[1]), float(way[2]))
+                settings.append(
+                    Setting(f"{name} flying", flown(scene, step), truth=flown(truth, step), frame=MOVING_FRAME)
+                )
+                if not position[0]:
+                    settings.append(Setting(f"{name} turning", moved(scene), truth=moved(truth), frame=MOVING_FRAME))
     return misplaced(subject, settings)
 
 
@@ -94,6 +116,7 @@ _PLACES: tuple[tuple[Vec3, Vec3], ...] = (  # where cameras are in the box, and 
 )
 
 
+@lru_cache(maxsize=1)
 def box_settings() -> list[Setting]:
     """Return cameras, still and flying, in a closed box of six colours on a background that must not be seen."""
     walls = tuple(polygon(7.0 * _CORNERS[list(corners)], color=color) for corners, color in _FACES)
@@ -107,7 +130,7 @@ def box_settings() -> list[Setting]:
 
 
 def _inside_box(subject: str) -> Verdict:
-    return misplaced(subject, box_settings())
+    return misplaced(subject, box_settings(), aim=_AIM)
 
 
 _MOSAIC = (
@@ -118,6 +141,7 @@ _MOSAIC = (
 )
 
 
+@lru_cache(maxsize=2)
 def near_settings(distance: float) -> list[Setting]:
     """Return a mosaic that a camera nearly touches, at a place where four of its pieces meet nearly in view."""
     out = []
@@ -132,41 +156,48 @@ def near_settings(distance: float) -> list[Setting]:
                 view = Camera(projection, position, target, fov_y_deg=50.0)
             else:
                 view = Camera(projection, position, target, height=distance)
-            out.append(Setting(f"{projection} at {at:g}", Scene("near", view, objects)))
+            scene = Scene("near", view, objects)
+            out.append(Setting(f"{projection} at {at:g}, {distance:g} away", scene))
+            step = (0.01 * distance, 0.02 * distance, 0.3 * distance)
+            out.append(Setting(f"{out[-1].name}, flying", flown(scene, step), frame=MOVING_FRAME))
     return out
 
 
 def _very_near(subject: str) -> Verdict:
     settings = [s for d in (1e-3, 1e-6) for s in near_settings(d)]
-    return misplaced(subject, settings)
+    return misplaced(subject, settings, aim=_AIM)
 
 
 CASES: tuple[HardCase, ...] = (
     HardCase(
         "behind-camera",
         "shapes",
-        "Floors, walls and slabs run from before the camera to behind it, others lie behind it; still and flying by.",
+        "Floors, walls and slabs run from before the camera to behind it, others lie behind it; still and flying by, "
+        "edges also 2^-10 to 2^-22 px from samples.",
         "The part before the camera is where it is, and nothing is mirrored from behind.",
         _passing,
     ),
     HardCase(
         "edge-on-polygon",
         "shapes",
-        "The camera is in the plane of polygons, also within their outlines, and before another polygon.",
+        "The camera is in the plane of polygons, also within their outlines, and before another "
+        "polygon; still, flying in those planes and with all turning about its axis.",
         "Nothing of those is seen, and nothing of the other is hidden.",
         _edge_on,
     ),
     HardCase(
         "inside-box",
         "shapes",
-        "The camera is in a closed box, in its middle, in a corner, and 0.001 from a wall of 14; still and flying.",
-        "Every sample shows the wall that it looks at, none the background.",
+        "The camera is in a closed box, in its middle, in a corner, and 0.001 from a wall of 14; still and "
+        "flying, edges also 2^-10 to 2^-22 px from samples.",
+        "Every sample shows the wall that it looks at, none the background; where not, within the format's rounding.",
         _inside_box,
     ),
     HardCase(
         "very-near",
         "shapes",
-        "The camera is 1e-3 and 1e-6 from four polygons that meet in view, at the origin and 12 away from it.",
+        "The camera is 1e-3 and 1e-6 from four polygons that meet in view, at the origin and 12 away from it; "
+        "still and flying, edges also 2^-10 to 2^-22 px from samples.",
         SHOWN,
         _very_near,
     ),

@@ -38,6 +38,8 @@ def test_a_case_says_what_it_asks_and_what_must_hold(name):
         (0.0, 0.0, 1.0, float("nan"), "failed"),
         (float("nan"), 1.0, 1.0, None, "failed"),
         (float("inf"), 1.0, float("inf"), None, "failed"),
+        (1.5, 1.0, float("inf"), None, "failed"),  # a limit without an end is none
+        (0.0, 0.0, 1.0, -1e-4, "failed"),
         (-1.0, 0.0, 1.0, None, "failed"),
         (0.5, 1.0, 0.9, None, "failed"),  # bounds the wrong way round
     ],

@@ -1,28 +1,33 @@
 """The hard cases of shapes and viewpoints: their outcomes, and that each kind of check can fail."""
 
 import dataclasses
+import math
 from functools import partial
 from typing import Any
 
 import numpy as np
 import pytest
 
-from aliasbench.bench.hard import coplanar, placing, shapes, viewpoints
+from aliasbench.bench.hard import aiming, coplanar, degenerate, placing, rays, shapes, viewpoints
 from aliasbench.bench.hard.case import EGL, FAST, OSMESA, PORTABLE, REFERENCE, TRACER
+from aliasbench.bench.hard.ownership import distance_to_outline, inside, pixel_points
 from aliasbench.bench.hard.painting import SNAPPED_PX, Painting, paint
 from aliasbench.bench.hard.placing import BLUE, ORANGE, SIZE, Setting, camera, flat, misplaced
 from aliasbench.renderers.frame import Frame
 from aliasbench.scenes.model import Scene
 from aliasbench.scenes.shapes import mesh
 
-CASES = {case.name: case for case in (*shapes.CASES, *coplanar.CASES, *viewpoints.CASES)}
+CASES = {case.name: case for case in (*shapes.CASES, *degenerate.CASES, *coplanar.CASES, *viewpoints.CASES)}
 # Every other answer is "ok".
 LIMITS = {
     "sliver-samples": {TRACER, FAST, PORTABLE, EGL, OSMESA},
     "coplanar": {EGL, OSMESA},
     "coplanar-moving": {EGL, OSMESA},
-    "behind-camera": {EGL, OSMESA},
-    "inside-box": {EGL, OSMESA},
+    "behind-camera": {TRACER, FAST, PORTABLE, EGL, OSMESA},
+    "inside-box": {TRACER, FAST, PORTABLE, EGL, OSMESA},
+    "many-vertices": {TRACER, FAST, PORTABLE, EGL, OSMESA},
+    "huge-polygon": {TRACER, FAST, PORTABLE, EGL, OSMESA},
+    "huge-polygon-exposed": {TRACER, FAST, PORTABLE, EGL, OSMESA},
     "very-near": {TRACER, FAST, PORTABLE, EGL, OSMESA},
 }
 # What is slow is asked for less of.
@@ -32,6 +37,14 @@ REDUCED: dict[tuple[str, str], Any] = {
     },
     ("sliver-light", REFERENCE): partial(shapes._sliver_light, powers=(1,)),
 }
+
+
+@pytest.fixture(autouse=True)
+def reduced(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Look at fewer of the settings with many corners, at each kind of them."""
+    rings, huge = shapes.ring_settings(), shapes.huge_settings()
+    monkeypatch.setattr(shapes, "ring_settings", lambda: [rings[k] for k in (1, 2, 5, 9)])
+    monkeypatch.setattr(shapes, "huge_settings", lambda: [huge[k] for k in (0, 4, 8, 9, 13, 17)])
 
 
 @pytest.mark.parametrize(("name", "subject"), [(c.name, s) for c in CASES.values() for s in c.subjects])
@@ -112,17 +125,17 @@ def test_layers_that_are_drawn_in_the_wrong_order_fail_on_the_ground(monkeypatch
 
 @pytest.mark.parametrize("subject", [TRACER, EGL, REFERENCE])
 def test_a_triangle_with_an_area_is_noticed(monkeypatch: pytest.MonkeyPatch, subject: str) -> None:
-    clean = shapes.degenerate_meshes()[0]
+    clean = degenerate.degenerate_meshes()[0]
     more = mesh([*clean.vertices, (12.0, 0.0, 0.0)], [*clean.triangles, (1, 2, 4)], color=clean.color)
-    monkeypatch.setattr(shapes, "degenerate_meshes", lambda: (clean, more))
+    monkeypatch.setattr(degenerate, "degenerate_meshes", lambda: (clean, more))
     assert CASES["degenerate-triangles"].check(subject).outcome == "failed"
     assert CASES["degenerate-files"].check(subject).outcome == "failed"
 
 
 def test_an_empty_picture_proves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    _, odd = shapes.degenerate_meshes()
+    _, odd = degenerate.degenerate_meshes()
     away = mesh(odd.vertices + 1e3, odd.triangles, color=odd.color)
-    monkeypatch.setattr(shapes, "degenerate_meshes", lambda: (away, away))
+    monkeypatch.setattr(degenerate, "degenerate_meshes", lambda: (away, away))
     assert CASES["degenerate-triangles"].check(TRACER).outcome == "failed"
 
 
@@ -136,6 +149,68 @@ def test_slivers_of_another_area_fail(monkeypatch: pytest.MonkeyPatch, share: fl
     monkeypatch.setattr(shapes, "sliver_hatch", hatch)
     # a twentieth of a coverage of .11 at a standard error of at most 7e-4: eight of them
     assert shapes._sliver_light(TRACER, powers=(2,)).outcome == "failed"
+
+
+@pytest.mark.parametrize("projection", placing.PROJECTIONS)
+def test_a_camera_that_is_aimed_has_an_edge_beside_a_sample(projection: placing.Projection) -> None:
+    outline = flat([(-9.3, -7.1), (8.7, -5.3), (3.9, 9.7)], ORANGE)
+    setting = Setting("triangle", Scene("triangle", camera(projection), (outline,)))
+    found = placing._pictures(setting, 2)
+    assert len(found) == 1 + 2 * len(aiming.BESIDE)
+    points = pixel_points(SIZE)
+    for first in (1, 1 + len(aiming.BESIDE)):
+        outlines = [painting.outlines[0] for _, painting in found[first : first + len(aiming.BESIDE)]]
+        nearest = int(distance_to_outline(points, outlines[-1]).argmin())  # of the finest aim
+        point = points[nearest : nearest + 1]
+        away = np.array([distance_to_outline(point, o)[0] * (1.0 if inside(point, o)[0] else -1.0) for o in outlines])
+        # the search ends within 1e-9 px, and what is left of it is straight to 1e-3 of 2^-10 px
+        np.testing.assert_allclose(np.abs(away), np.abs(aiming.BESIDE), rtol=1e-3, atol=2e-9)
+        assert (np.sign(away) == np.sign(away[0]) * np.sign(aiming.BESIDE)).all()
+
+
+def test_ray_bounds_follow_from_distances_in_pixels() -> None:
+    square = flat([(-5.0, -5.0), (5.0, -5.0), (5.0, 5.0), (-5.0, 5.0)], ORANGE)
+    scene = Scene("square", camera("orthographic"), (square,))
+    # e = (10, 0, 0), s = (0, 10, -96) and the pinhole's directions at most (5, 5, 48) / 48.5: |e_x| (|s_y| |D_z| +
+    # |s_z| |D_y|) over |e x s|, or half of it, with origins up to (18, 12) from the axis, over |e|
+    off, corner = math.sqrt(48.0**2 + 50.0), 1.0 + (36.0**2 + 24.0**2) / 4.0 / 48.0**2
+    parallel = 2.0**-24 * (6.0 * (off + math.hypot(18.0, 12.0)) + 7.0 * 10.0 * (10.0 + 2.0 * 18.0) / 20.0)
+    assert rays.ray_bound(scene, SIZE) == pytest.approx(parallel, rel=1e-9)
+    through = Scene("square", camera("perspective"), (square,))
+    near = math.sqrt(48.0**2 + 5.0**2)
+    products = 10.0 * (10.0 * 48.0 / off + 96.0 * 5.0 / off) / (10.0 * math.hypot(10.0, 96.0))
+    pinhole = 2.0**-24 * (6.0 * off / near + 7.0 * products) * 48.0 * corner
+    assert rays.ray_bound(through, SIZE) == pytest.approx(pinhole, rel=1e-9)
+    # roundings are relative: a scene a thousand times as large is as many pixels off
+    large = Scene("large", camera("perspective", (0.0, 0.0, 48e3)), (flat(1e3 * square.vertices[:, :2], ORANGE),))
+    assert rays.ray_bound(large, SIZE) == pytest.approx(pinhole, rel=1e-9)
+    # what is not in the picture may be anywhere
+    away = flat([(60.0, 0.0), (1e6, 0.0), (1e6, 9.0)], ORANGE)
+    beside = dataclasses.replace(scene, objects=(square, away))
+    assert rays.ray_bound(beside, SIZE) == rays.ray_bound(scene, SIZE)
+    assert rays.truth_bound(scene, SIZE) < 2.0**-24 * rays.ray_bound(scene, SIZE)
+
+
+def test_the_fast_test_may_see_through_nowhere_but_at_triangles_sides(monkeypatch: pytest.MonkeyPatch) -> None:
+    square = flat([(-8.0, -8.0), (8.0, -8.0), (8.0, 8.0), (-8.0, 8.0)], ORANGE)
+    setting = Setting("square", Scene("square", camera("orthographic"), (square,)))
+    real = placing.render
+    holes = {
+        "on the diagonal": (14, 15),
+        "off it": (14, 18),
+    }  # of the triangles (0, 1, 2) and (0, 2, 3), rows downwards
+    for where, (row, column) in holes.items():
+
+        def render(*args: Any, at: tuple[int, int] = (row, column), **options: Any) -> Frame:
+            frame = real(*args, **options)
+            pixels = frame.pixels.copy()
+            assert (pixels[at] == ORANGE).all()
+            pixels[at] = 0.0
+            return dataclasses.replace(frame, pixels=pixels)
+
+        monkeypatch.setattr(placing, "render", render)
+        assert misplaced(FAST, [setting]).outcome == ("ok" if where == "on the diagonal" else "failed")
+        assert misplaced(TRACER, [setting]).outcome == "failed"
 
 
 def test_the_snapped_bound_is_half_a_subpixel_step_each_way() -> None:
