@@ -80,7 +80,8 @@ def _shifted(
             break
         before, low, high = at, high, high - at / slope
         at = off(high * ahead)[0]
-        slope = (at - before) / (high - low) if high != low else slope
+        if abs(high - low) > 2.0**-12 * unit:  # of what is nearer, differences are mostly rounding
+            slope = (at - before) / (high - low)
     if not abs(at) < 1e-6 or slope == 0.0:
         return []
     return [_moved(scene, (high + (b - at) / slope) * ahead) for b in beside]

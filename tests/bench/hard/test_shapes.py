@@ -153,7 +153,7 @@ def test_slivers_of_another_area_fail(monkeypatch: pytest.MonkeyPatch, share: fl
 
 @pytest.mark.parametrize("projection", placing.PROJECTIONS)
 def test_a_camera_that_is_aimed_has_an_edge_beside_a_sample(projection: placing.Projection) -> None:
-    outline = flat([(-9.3, -7.1), (8.7, -5.3), (3.9, 9.7)], ORANGE)
+    outline = flat([(-9.37, -7.13), (8.71, -5.19), (3.93, 9.68)], ORANGE)
     setting = Setting("triangle", Scene("triangle", camera(projection), (outline,)))
     found = placing._pictures(setting, 2)
     assert len(found) == 1 + 2 * len(aiming.BESIDE)
