@@ -32,6 +32,7 @@ from aliasbench.scenes.model import FloatArray, Scene
 from aliasbench.scenes.shapes import mesh
 
 _SEEDS, _SAMPLES = 16, 16
+_MORE = {5: 4, 6: 16}  # times as many samples of what is hardly ever hit: some 200 hits are expected at least
 _MOST_ERRORS = 4.5  # standard errors, of 15 degrees of freedom: one in 2400 by chance, and no seed here is chance
 _LARGEST = 1e6  # times the view
 
@@ -59,7 +60,7 @@ def sliver_hatch(width: float, seed: int) -> tuple[Scene, float]:
 
 def _sliver_light(subject: str, powers: Iterable[int] = range(1, 7)) -> Verdict:
     """The light of needles 1e-1 to 1e-6 px wide: the mean of 16 seeds against their area."""
-    found, errors, bound = [], [], 0.0
+    found, errors, shares, bound = [], [], [], 0.0
     for power in powers:
         scene, area = sliver_hatch(10.0**-power, power)
         if subject == REFERENCE:
@@ -67,17 +68,21 @@ def _sliver_light(subject: str, powers: Iterable[int] = range(1, 7)) -> Verdict:
             found.append(abs(float(frame.pixels[..., 0].mean()) - area))
             bound = max(bound, (frame.uncertainty or 0.0) + 1e-12)
             continue
-        with prepare(scene, samples_key(subject, _SAMPLES, "sampler=jittered"), size=SIZE) as prepared:
+        count = _SAMPLES * _MORE.get(power, 1)
+        with prepare(scene, samples_key(subject, count, "sampler=jittered"), size=SIZE) as prepared:
             means = [float(prepared.render(seed=k).pixels[..., 0].mean(dtype=np.float64)) for k in range(_SEEDS)]
         # of what is seldom hit 16 seeds may say too little: a hit is all or nothing, as of a random sample
-        samples = SIZE[0] * SIZE[1] * _SAMPLES * _SEEDS
+        samples = SIZE[0] * SIZE[1] * count * _SEEDS
         error = max(float(np.std(means, ddof=1)) / math.sqrt(_SEEDS), math.sqrt(area / samples) / 2.0)
         errors.append(error)
+        shares.append(error / area)
         found.append(abs(float(np.mean(means)) - area) / error)
     if subject == REFERENCE:
         why = "its own bound, and rounding of the area compared with"
         return Verdict(max(found), "contrast", bound, bound, why)
-    listed = ", ".join(f"1e-{k} px {z:.1f}" for k, z in zip(powers, found, strict=True))
+    listed = ", ".join(
+        f"1e-{k} px {z:.1f} (each {s:.1%} of the light)" for k, z, s in zip(powers, found, shares, strict=True)
+    )
     why = "samples are unbiased whatever the width: only chance is left, 4.5 standard errors of 16 seeds"
     return Verdict(max(found), "standard errors", _MOST_ERRORS, _MOST_ERRORS, why, max(errors), listed)
 

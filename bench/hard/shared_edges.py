@@ -19,7 +19,6 @@ from aliasbench.bench.hard.edge_pictures import (
     farthest,
     label,
     ray_bound,
-    snap_bound,
     stages,
     worst_of,
 )
@@ -34,6 +33,7 @@ ROUGH = 0.05  # world units: by how much the mesh's vertices differ in depth
 BESIDE = (0.0, 2.0**-24, 2.0**-22, 2.0**-20, 2.0**-18, 2.0**-16, 2.0**-13, 2.0**-10)
 FILMS = 16  # samples a pixel where coverages are summed
 SEEDS = 4
+RULE = "neighbours have the same snapped vertices, and a sample on an edge belongs to one of them by rule"
 
 
 def relief(stage: Stage, beside: float) -> Surface:
@@ -103,7 +103,7 @@ def _from_edges(stage: Stage, surface: Surface, lost: NDArray[np.bool_]) -> Floa
 
 def _why_gaps(subject: str, vertices: bool) -> str:
     if subject in RASTERS:
-        return "neighbours have the same snapped vertices, and a sample on an edge belongs to one of them by rule"
+        return RULE
     if subject == FAST:
         return (
             "Embree's fast test rounds an edge in each of its two triangles on its own, by up to this much; a sample "
@@ -140,7 +140,7 @@ def _edge_parts(subject: str) -> Verdict:
             bad = (owners != 1.0) & inner
             wrong += int(bad.sum())
             widest = max(widest, farthest(distance, bad))
-            part_bound, why = edge_bound(subject, stage, parts, extent=extent)
+            part_bound, why = (0.0, RULE) if subject in RASTERS else edge_bound(subject, stage, parts, extent=extent)
             bound = max(bound, part_bound)
         if subject == REFERENCE:
             why = "the areas of a pixel's parts sum to one; float64 leaves some tens of roundings"
@@ -176,19 +176,23 @@ def _coverage_sums(subject: str) -> Verdict:
         rounding = (len(parts) + 1) * HALF_ULP
         raster = subject in RASTERS
         text = samples_key(subject, FILMS, "sampler=jittered" if raster else "sampler=jittered,pattern=shared")
-        close = snap_bound(float(size[0])) if raster else ray_bound(subject, stage, parts)
+        close = 0.0 if raster else ray_bound(subject, stage, parts)
         error, worst_share = 0.0, 0.0
         for seed in range(SEEDS):
             error = max(error, _sum_error(text, stage, parts, inner, seed=seed)[0])
-            worst_share = max(worst_share, _near_share(stage, outlines, close, inner, seed))
-        if raster and not stage.moving and stage.name == "orthographic":
-            # the hub on the grid of subpixels, edges through hardware samples
-            exact = [polygon(stage.place(o)) for o in fan((12.375, 8.625))]
-            error = max(error, _sum_error(with_keys(subject, "msaa=4"), stage, exact, inner, seed=0)[0])
-        why = (
-            f"of {FILMS} samples at known places only those within {close:.1e} px of an edge may have another number "
-            f"of owners than one; {len(parts)} float32 means and their sum are rounded"
-        )
+            worst_share = 0.0 if raster else max(worst_share, _near_share(stage, outlines, close, inner, seed))
+        if raster and not stage.moving:
+            # also with the hub on the grid of subpixels, edges through hardware samples
+            for at in (hub, (12.375, 8.625)):
+                exact = [polygon(stage.place(o)) for o in fan(at)]
+                error = max(error, _sum_error(with_keys(subject, "msaa=4"), stage, exact, inner, seed=0)[0])
+        rounded = f"{len(parts)} float32 means and their sum are rounded"
+        why = f"{RULE}; {rounded}"
+        if not raster:
+            why = (
+                f"of {FILMS} samples at known places only those within {close:.1e} px of an edge may have another "
+                f"number of owners than one; {rounded}"
+            )
         note = f"{label(stage)}; {SEEDS} seeds"
         found.append(Verdict(error, "contrast", rounding, rounding + worst_share, why, note=note))
     return worst_of(found)
