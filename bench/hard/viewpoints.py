@@ -4,6 +4,7 @@ A polygon that reaches behind the camera shows the part before it; one whose pla
 """
 
 import math
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -25,8 +26,8 @@ from aliasbench.bench.hard.placing import (
     misplaced,
     moved,
 )
-from aliasbench.scenes.model import Camera, Scene, Surface, Vec3
-from aliasbench.scenes.shapes import polygon
+from aliasbench.scenes.model import Camera, Checker, Scene, Surface, Vec3
+from aliasbench.scenes.shapes import polygon, quad
 
 _AIM = 2
 
@@ -72,6 +73,39 @@ def _passing(subject: str) -> Verdict:
     # the reference's near plane for parallel rays is 1e-14 of the largest coordinate, under 1e3, behind the camera, and
     # slabs, which it cuts, rise by half
     return misplaced(subject, _flown_by(), aim=_AIM, near_px=1e-14 * 1e3)
+
+
+_SQUARES = (5, 29)
+
+
+@lru_cache(maxsize=1)
+def textured_settings() -> list[Setting]:
+    """Return a floor and a wall with checkers on them that run past the camera to behind it, still and flying by."""
+    floor = np.array([(-7.3, -3.1, 200.0), (9.1, -3.1, 200.0), (9.1, -3.1, -900.0), (-7.3, -3.1, -900.0)])
+    wall = np.array([(5.3, -2.9, 300.0), (5.3, 14.0, 300.0), (5.3, 14.0, -300.0), (5.3, -2.9, -300.0)])
+    shares = [np.arange(count + 1) / count for count in _SQUARES]
+    out = []
+    for projection in PROJECTIONS:
+        view = camera(projection, target=(0.3, 0.2, 0.0))
+        for what, corners in (("floor", floor), ("wall", wall)):
+            squares = []
+            for i in range(_SQUARES[0]):
+                for j in range(_SQUARES[1]):
+                    uv = np.array([(shares[0][i + a], shares[1][j + b]) for a, b in ((0, 0), (1, 0), (1, 1), (0, 1))])
+                    points = corners[0] + uv @ np.stack([corners[1] - corners[0], corners[3] - corners[0]])
+                    squares.append(polygon(points, color=BLUE if (i + j) % 2 == 0 else ORANGE))
+            checker = Checker((float(_SQUARES[0]), float(_SQUARES[1])), black=BLUE, white=ORANGE)
+            shown = quad(corners, texture="squares")
+            scene, truth = Scene(what, view, (shown,), {"squares": checker}), Scene(what, view, tuple(squares))
+            out.append(Setting(f"{projection} {what}", scene, truth=truth))
+            step = (0.5, 0.25, -4.0)
+            flying = Setting(f"{projection} {what} flying", flown(scene, step), truth=flown(truth, step))
+            out.append(replace(flying, frame=MOVING_FRAME))
+    return out
+
+
+def _passing_textured(subject: str) -> Verdict:
+    return misplaced(subject, textured_settings())
 
 
 def _edge_on(subject: str) -> Verdict:
@@ -176,6 +210,13 @@ CASES: tuple[HardCase, ...] = (
         "edges also 2^-10 to 2^-22 px from samples.",
         "The part before the camera is where it is, and nothing is mirrored from behind.",
         _passing,
+    ),
+    HardCase(
+        "behind-camera-textured",
+        "shapes",
+        "A floor and a wall with checkers on them run from before the camera to behind it; still and flying by.",
+        "A sample shows the square that is there; where not, within the rounding of the outline.",
+        _passing_textured,
     ),
     HardCase(
         "edge-on-polygon",

@@ -29,7 +29,7 @@ CASES: Mapping[str, HardCase] = {case.name: case for module in MODULES for case 
 # Everything else is "ok": a limit that is new must be noticed.
 LIMITS: Mapping[str, tuple[str, ...]] = {
     "centre-edges": (TRACER, FAST, PORTABLE, EGL, OSMESA),
-    "border-edges": (),
+    "border-edges": (EGL, OSMESA),
     "flat-slopes": (TRACER, FAST, PORTABLE, EGL, OSMESA),
     "fan-vertex": (TRACER, FAST, PORTABLE, EGL, OSMESA),
     "edge-on-mesh": (EGL, OSMESA),
