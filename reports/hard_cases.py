@@ -79,9 +79,9 @@ def _table(rows: Sequence[Row], subjects: Sequence[str]) -> Table:
 
 
 def _verdict(cell: Answer) -> Cell:
-    unit = "" if cell.outcome == "ok" else cell.unit
+    allowed = f"of {cell.allowed}" if cell.outcome != "ok" and cell.allowed else ""
     title = f"{cell.detail}: {cell.why}" if cell.why else cell.detail
-    return Cell(cell.text, title=title, style=STYLES.get(cell.outcome, "badge"), note=unit)
+    return Cell(cell.text, title=title, style=STYLES.get(cell.outcome, "badge"), note=allowed)
 
 
 def _limits(row: Row, subjects: Sequence[str]) -> list[Limit]:

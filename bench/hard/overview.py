@@ -38,14 +38,14 @@ class Found:
 class Cell:
     """One verdict: `outcome` is "ok", "limit", "failed" or "unsupported"; `text` is short, `detail` says it all.
 
-    `unit` is the measured figure's, `why` is where its bounds come from; both are empty where a reason stands in place
-    of a verdict.
+    `allowed` is the bound with the unit that the measured figure has too, `why` is where the bounds come from; both are
+    empty where a reason stands in place of a verdict.
     """
 
     outcome: str
     text: str
     detail: str
-    unit: str = ""
+    allowed: str = ""
     why: str = ""
 
 
@@ -88,13 +88,14 @@ def make_cell(found: Found) -> Cell:
     if extras is None or found.outcome is None:
         return Cell(found.status, found.status, found.error or "no reason was recorded")
     measured = f"{figure(found.value)} {extras['unit']}"
+    allowed = f"{figure(extras['bound'])} {extras['unit']}"
     detail = f"{measured}, {figure(extras['bound'])} allowed"
     if extras["standard_error"] is not None:
         detail += f", standard error {figure(extras['standard_error'])}"
     if extras["note"]:
         detail += f"; {extras['note']}"
     text = "ok" if found.outcome == "ok" else f"{found.outcome} {figure(found.value)}"
-    return Cell(found.outcome, text, detail, str(extras["unit"]), str(extras["why"]))
+    return Cell(found.outcome, text, detail, allowed, str(extras["why"]))
 
 
 def figure(value: float | None) -> str:

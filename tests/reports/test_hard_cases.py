@@ -75,7 +75,7 @@ def test_a_row_has_the_verdict_of_every_subject(section: HardSection) -> None:
     (row,) = table.rows
     assert [cell.text for cell in row] == ["spokes", "ok", "limit 0.00125", "limit 0.00125", "failed"]
     assert row[0].note == "Who owns it? One does."
-    assert (row[2].note, row[2].style) == ("px", "badge limit")
+    assert (row[2].note, row[2].style) == ("of 0.002 px", "badge limit")
     assert row[2].title == "0.00125 px, 0.002 allowed; in <row> 3: 8 bits"
     assert row[4].title == "no spokes"
 
