@@ -10,17 +10,21 @@ robust test takes the sign of (e x s) . D:
 * rounded input (vertex, origin, direction, difference) adds 4 u R, and the test's own tolerance 2 u R; from a pinhole
   over the distance to where the edge is seen.
 
+Parallel rays begin in the camera's plane: where a polygon passes through it, the distance to the polygon's plane, as
+many roundings of R, moves the line at which it is first seen by that over the share of its normal across the rays.
+
 An angle is scale / cos^2 as many pixels, off the axis. What moves is traced in a frame of its own, whose origin is
 within its extent. Where two edges meet sharply what both add reaches farther along them than this: none of it is
 allowed for.
 """
 
 import itertools
+import math
 from collections.abc import Iterator
 
 import numpy as np
 
-from aliasbench.bench.hard.edge_pictures import HALF_ULP
+from aliasbench.bench.hard.edge_pictures import HALF_ULP, PERMANENT
 from aliasbench.bench.hard.painting import outline_seen
 from aliasbench.scenes.model import FloatArray, Scene, Surface
 from aliasbench.scenes.motion import object_matrix
@@ -47,6 +51,7 @@ def ray_bound(scene: Scene, size: tuple[int, int], *, frame: int = 0, fraction: 
         local = surface.vertices @ matrix[:3, :3].T + matrix[:3, 3] - view.origin
         more = np.zeros(3) if surface.motion.is_static else np.ptp(local, axis=0) / 2.0
         worst = max(worst, *(_moved(view, a, b, more) for a, b in _sides(surface, local)))
+        worst = max(worst, *(_begins(view, loop, more) for loop in _loops(surface, local)))
     return HALF_ULP * worst
 
 
@@ -67,8 +72,26 @@ def truth_bound(scene: Scene, size: tuple[int, int], *, frame: int = 0, fraction
 
 def _sides(surface: Surface, local: FloatArray) -> Iterator[tuple[FloatArray, FloatArray]]:
     """Yield the ends of a polygon's sides, or of a mesh's triangles'."""
-    for loop in [local] if surface.is_polygon else local[surface.triangles]:
+    for loop in _loops(surface, local):
         yield from zip(loop, np.roll(loop, -1, axis=0), strict=True)
+
+
+def _loops(surface: Surface, local: FloatArray) -> list[FloatArray]:
+    return [local] if surface.is_polygon else list(local[surface.triangles])
+
+
+def _begins(view: View, loop: FloatArray, more: FloatArray) -> float:
+    """Return by how many pixels, of 2^24, the line is misplaced at which parallel rays begin to meet a plane."""
+    depth = loop @ view.forward
+    if view.perspective or not depth.min() < 0.0 < depth.max():
+        return 0.0
+    normal = np.cross(loop, np.roll(loop, -1, axis=0)).sum(axis=0)
+    across = float(np.hypot(normal @ view.right, normal @ view.up))
+    if across <= 1e-9 * float(np.linalg.norm(normal)):
+        return 0.0
+    origin = math.hypot(view.width, view.height) / 2.0 / view.scale
+    reach = float(np.linalg.norm(loop, axis=1).max() + origin + np.linalg.norm(more))
+    return (INPUT + PRODUCT * PERMANENT) * reach * float(np.linalg.norm(normal)) / across * view.scale
 
 
 def _moved(view: View, a: FloatArray, b: FloatArray, more: FloatArray) -> float:
