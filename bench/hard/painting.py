@@ -17,8 +17,6 @@ from aliasbench.scenes.model import FloatArray, Scene, Vec3
 from aliasbench.scenes.motion import object_matrix
 from aliasbench.scenes.projection import View, view_at
 
-HALF_ULP = 2.0**-24  # of float32, relative
-RAY_ROUNDINGS = 8.0
 TIE_PX = 1e-12  # the truth's own rounding: nearer to an edge a sample is on it, and either side's
 SNAPPED_PX = math.sqrt(2.0) / 512.0  # 8 subpixel bits: by half a step of 1/256 px, right and down
 SNAPPED = "8 subpixel bits: corners snap to 1/256 px, by at most half a step right and half a step down"
@@ -159,31 +157,3 @@ def _cut(corners: FloatArray, distance: FloatArray) -> FloatArray:
         if here >= 0.0:
             out.append(corners[k])
     return np.array(out).reshape(-1, 3)
-
-
-def ray_bound_px(scene: Scene, size: tuple[int, int], *, frame: int = 0, fraction: float = 0.0) -> float:
-    """Return by how many pixels float32 rays may misplace an edge of a scene, by a count of roundings; see also `rays`.
-
-    A corner, the ray's origin and its direction are rounded to float32, and the edge test's products and sums of three
-    terms are five more roundings: together `RAY_ROUNDINGS` half ulps of the largest coordinate relative to the eye, or
-    to the body. Parallel rays shift an edge by that much. From a pinhole the edge, at distance h from the eye, turns by
-    that much over h, which at an angle a off the axis are the focal length / cos^2 a pixels a radian.
-    """
-    view = view_at(scene.camera, scene.animation, frame, fraction, size)
-    off_axis = 1.0 + (size[0] ** 2 + size[1] ** 2) / 4.0 / view.scale**2
-    worst = 0.0
-    for surface in scene.objects:
-        matrix = object_matrix(surface.motion, scene.animation, frame, fraction)
-        local = surface.vertices @ matrix[:3, :3].T + matrix[:3, 3] - view.origin
-        first, second = local, np.roll(local, -1, axis=0)
-        reach = float(np.linalg.norm(local, axis=1).max())
-        if not surface.motion.is_static:
-            reach += float(np.linalg.norm(np.ptp(local, axis=0))) / 2.0
-        if not view.perspective:
-            worst = max(worst, reach * view.scale)
-            continue
-        along = second - first
-        along = along / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), np.finfo(np.float64).tiny)
-        height = np.linalg.norm(np.cross(first, along), axis=1)
-        worst = max(worst, float((reach / height).max()) * view.scale * off_axis)
-    return RAY_ROUNDINGS * HALF_ULP * worst

@@ -16,7 +16,7 @@ from aliasbench.bench.hard.aiming import aimed
 from aliasbench.bench.hard.case import FAST, RASTERS, REFERENCE, Verdict, samples_key, with_keys
 from aliasbench.bench.hard.edge_pictures import PERMANENT, worst_of
 from aliasbench.bench.hard.ownership import distance_to_outline, pixel_points
-from aliasbench.bench.hard.painting import SNAPPED, SNAPPED_PX, TIE_PX, Painting, outline_seen, paint, ray_bound_px
+from aliasbench.bench.hard.painting import SNAPPED, SNAPPED_PX, TIE_PX, Painting, outline_seen, paint
 from aliasbench.bench.hard.rays import WHY, WHY_FAST, ray_bound, truth_bound
 from aliasbench.renderers.catalog import render
 from aliasbench.scenes.model import Animation, Camera, FloatArray, Motion, Scene, Spin, Surface, Vec3
@@ -122,9 +122,7 @@ def misplaced(
         By how much a cut at the reference's near plane moves in the picture.
     """
     judged = [
-        _covered(subject, setting, reach_px, near_px)
-        if subject == REFERENCE
-        else _sampled(subject, setting, aim, cut, reach_px)
+        _covered(subject, setting, reach_px, near_px) if subject == REFERENCE else _sampled(subject, setting, aim, cut)
         for setting in settings
     ]
     worst = worst_of([verdict for verdict, _, _ in judged])
@@ -143,7 +141,7 @@ def _covered(subject: str, setting: Setting, reach_px: float, near_px: float) ->
     return Verdict(error, "contrast", bound, bound, why, note=setting.name), 0, 1
 
 
-def _sampled(subject: str, setting: Setting, aim: int, cut: bool, reach_px: float) -> tuple[Verdict, int, int]:
+def _sampled(subject: str, setting: Setting, aim: int, cut: bool) -> tuple[Verdict, int, int]:
     """Return the verdict on single samples, how many are wrong, and of how many pictures."""
     bound, exact = _bounds(setting)
     apart = np.array([_apart(subject, each, painting) for each, painting in _pictures(setting, aim)])
@@ -153,10 +151,6 @@ def _sampled(subject: str, setting: Setting, aim: int, cut: bool, reach_px: floa
         why = WHY_FAST if subject == FAST else WHY
         if cut and bound > CUT_PX:
             bound, why = CUT_PX, f"{CUT}; {why}"
-        elif reach_px:
-            # depths of one plane decide at its horizon which polygon is seen: their rounding tilts it
-            own = ray_bound_px(setting.scene, SIZE, frame=setting.frame, fraction=setting.fraction)
-            bound = max(bound, own)
     verdict = Verdict(float(apart.max()), "px", exact, max(bound, exact), why, note=setting.name)
     return verdict, int((apart > exact).sum()), len(apart)
 

@@ -11,6 +11,8 @@ from aliasbench.bench.hard.edge_pictures import worst_of
 from aliasbench.bench.hard.painting import SNAPPED, SNAPPED_PX, TIE_PX, paint
 from aliasbench.bench.hard.placing import (
     BLUE,
+    CUT,
+    CUT_PX,
     GREEN,
     MOVING_FRAME,
     ORANGE,
@@ -187,8 +189,9 @@ def _huge_exposed(subject: str) -> Verdict:
         if subject in RASTERS:
             bound, why = SNAPPED_PX, SNAPPED
         else:
-            bound = ray_bound(scene, SIZE, frame=setting.frame, fraction=setting.fraction)
-            why = f"{WHY}; what moves while the shutter is open is traced whole"
+            bound, why = ray_bound(scene, SIZE, frame=setting.frame, fraction=setting.fraction), WHY
+            if bound > CUT_PX:
+                bound, why = CUT_PX, f"{CUT}; {WHY}"
         found.append(Verdict(worst, "px", TIE_PX, bound, why, note=f"{setting.name}; {wrong} samples off"))
     return worst_of(found)
 

@@ -1,11 +1,11 @@
-"""Still triangles so large that float32 would misplace their outline, cut in float64 into parts that it does not.
+"""Triangles so large that float32 would misplace their outline, cut in float64 into parts that it does not.
 
 An edge test's rounding grows with the distance to the edge's ends, not to the part of it that is seen: an outline that
 reaches a million pictures far would be pixels away from its place. Along planes about the camera, which all triangles
 are cut along alike so that what they share stays shared, everything is cut into parts not much larger than their
 distance. Nothing is left out: shadows and reflections need what is outside of the picture. Ordinary scenes have no such
 outline, and are left as they are. What is not mended: an edge that runs away from a pinhole keeps, where it is far, a
-rounding of that distance; and what moves while the shutter is open is traced whole.
+rounding of that distance.
 """
 
 import numpy as np
@@ -58,6 +58,39 @@ def cut_large(
     sides = range(3 if view.perspective else 2)
     planes = [(axes[:, k], sign * d) for d in distances for k in sides for sign in (1.0, -1.0)]
     return _cut(mesh, [(normal, offset + float(normal @ (view.origin - anchor))) for normal, offset in planes])
+
+
+def cut_about(
+    mesh: Mesh, view: View, place: FloatArray, axes: FloatArray, travel: float
+) -> tuple[Mesh, NDArray[np.int64] | None]:
+    """Return what `cut_large` does, of a mesh that moves: about a place in its frame, of a pinhole or where rays are.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    view : View
+        For the picture's measures.
+    place : (3,) float64
+        From which, or about which, the mesh is seen at the middle of the exposure; `travel` is how far from there it is
+        seen at other times.
+    axes : (3, 3) float64
+        Of length 1, right, up and forward.
+    """
+    local = (mesh.vertices - place) @ axes.T
+    reach = float(np.abs(local).max())
+    if view.perspective:
+        nearest = _nearest_of_misplaced(_edges(mesh), local, view)
+        if nearest == np.inf:
+            return mesh, None
+        nearest = max(nearest, travel)
+    else:
+        nearest = _WIDTH / 2.0 * max(view.width, view.height) / view.scale + travel
+        if reach * view.scale * _ROUNDING <= _TOLERANCE_PX or reach <= _STEP * nearest:
+            return mesh, None
+    steps = min(_MOST_STEPS, 1 + int(np.log(max(reach / nearest, 1.0)) / np.log(_STEP)))
+    distances = [nearest * _STEP**k for k in range(steps)]
+    planes = [(axis, sign * d) for d in distances for axis in axes for sign in (1.0, -1.0)]
+    return _cut(mesh, [(normal, offset + float(normal @ place)) for normal, offset in planes])
 
 
 def _edges(mesh: Mesh) -> NDArray[np.int64]:

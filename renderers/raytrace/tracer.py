@@ -22,15 +22,14 @@ from aliasbench.renderers.raytrace.development import Development, Room, is_plai
 from aliasbench.renderers.raytrace.exposure import Exposure, plan_exposure
 from aliasbench.renderers.raytrace.film import Film
 from aliasbench.renderers.raytrace.lighting import is_scattered, put_materials
+from aliasbench.renderers.raytrace.moving import Moving
 from aliasbench.renderers.raytrace.paths import Scattering
 from aliasbench.renderers.raytrace.shading import Tables
 from aliasbench.renderers.raytrace.start import Spheres
 from aliasbench.renderers.raytrace.still import Still
 from aliasbench.renderers.raytrace.tables import (
     Mesh,
-    body_mesh,
     build_looks,
-    build_ownership,
     build_tables,
     camera_values,
 )
@@ -148,7 +147,6 @@ class PreparedRaytrace:
         "_looks",
         "_moving",
         "_optics",
-        "_placed",
         "_room",
         "_scene",
         "_setup_seconds",
@@ -169,18 +167,17 @@ class PreparedRaytrace:
         self._bodies = build_bodies(scene)
         self._looks = build_looks(scene, technique.texture)
         put_materials(scene, self._looks.objects)
-        self._placed = self._looks.textured or self._is_scattered
+        placed = self._looks.textured or self._is_scattered
         self._footprint = float(technique.shading_samples) ** -0.5
-        self._still = Still(scene, self._looks, placed=self._placed, lit=self._is_scattered, robust=technique.robust)
+        self._still = Still(scene, self._looks, placed=placed, lit=self._is_scattered, robust=technique.robust)
         self._optics = make_optics(technique, size[0])
         self._room = Room()
         has_lens = scene.camera.lens_radius > 0.0
         self._is_plain = is_plain(technique, self._optics) and not has_lens and not self._is_scattered
         self._spheres = Spheres.about(self._bodies)
         exposure = plan_exposure(scene, technique, size, self._bodies, self._spheres, 0)
-        meshes = [body_mesh(body, self._looks) for body in exposure.moving]
-        engine.set_moving(meshes)
-        self._moving = build_ownership(meshes, placed=self._placed)
+        self._moving = Moving(scene, self._looks, exposure.moving, placed=placed)
+        self._moving.place(exposure, engine.set_moving)
         self._still.place(exposure, engine.set_still)
         self._setup_seconds = time.perf_counter() - started
         self._size = (1, 1)
@@ -195,6 +192,7 @@ class PreparedRaytrace:
         started = time.perf_counter()
         technique = self._technique
         exposure = plan_exposure(self._scene, technique, self._size, self._bodies, self._spheres, frame)
+        self._moving.place(exposure, self._engine.set_moving)
         self._still.place(exposure, self._engine.set_still)
         start = frame_key(seed, pattern_frame(technique.reseed, frame))
         pixels, counts = self._expose(exposure, start, progress)
@@ -207,11 +205,13 @@ class PreparedRaytrace:
     ) -> tuple[NDArray[np.float32], NDArray[np.int32] | None]:
         """Return the picture, and the number of samples of each pixel where they differ."""
         scene, shutter, anchor, t = self._scene, exposure.shutter, exposure.anchor, self._technique
-        bodies = np.zeros((len(exposure.moving), BODY_SIZE))
-        for values, body in zip(bodies, exposure.moving, strict=True):
+        bodies = np.zeros((len(self._moving.bodies), BODY_SIZE))
+        for values, body in zip(bodies, self._moving.bodies, strict=True):
             values[:] = body_values(scene, body, shutter, anchor)
         lights = light_values(scene, shutter.first, anchor)
-        tables = build_tables(scene, self._looks, self._still.ownership, self._moving, bodies, lights, self._footprint)
+        tables = build_tables(
+            scene, self._looks, self._still.ownership, self._moving.ownership, bodies, lights, self._footprint
+        )
         camera = camera_values(scene, shutter, anchor, exposure.start)
         is_adaptive = t.adaptive != "off"
         pattern = make_pattern(

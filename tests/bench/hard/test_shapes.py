@@ -27,7 +27,7 @@ LIMITS = {
     "inside-box": {TRACER, FAST, PORTABLE, EGL, OSMESA},
     "many-vertices": {TRACER, FAST, PORTABLE, EGL, OSMESA},
     "huge-polygon": {TRACER, FAST, PORTABLE, EGL, OSMESA},
-    "huge-polygon-exposed": {TRACER, FAST, PORTABLE, EGL, OSMESA},
+    "huge-polygon-exposed": {EGL, OSMESA},
     "very-near": {TRACER, FAST, PORTABLE, EGL, OSMESA},
 }
 # What is slow is asked for less of.
