@@ -162,17 +162,20 @@ PAIRS: Mapping[str, Pair] = MappingProxyType(
         "spatial": Pair(
             *_by("propeller:rev_per_s=2,shutter=0.5", STRATIFIED, POINT),
             "Whatever the motion, borders are smooth on the left and stairs on the right.",
+            side=40,
             frames=15,
         ),
         "temporal": Pair(
             *_by("propeller:rev_per_s=2,shutter=1", STRATIFIED, "raytrace:spp=16,time=center"),
             "The shutter is open for the whole frame. Right, nothing of the blur is drawn.",
+            side=40,
             frames=15,
         ),
         "shutter": Pair(
             Shot("propeller:rev_per_s=2,shutter=0.9", STRATIFIED),
             Shot("propeller:rev_per_s=2,shutter=0.1", STRATIFIED),
             "Blades flow into each other on the left, and are seen one by one on the right.",
+            side=40,
             frames=15,
         ),
         "apparent_velocity": Pair(

@@ -33,7 +33,7 @@ from aliasbench.renderers.sampling.patterns import sample_set
 from aliasbench.scenes.model import FloatArray, Scene
 from aliasbench.scenes.shapes import mesh
 
-_SEEDS, _SAMPLES = 16, 16
+_SEEDS, _SAMPLES, _INSTANTS = 16, 16, 16
 _MORE = {5: 4, 6: 16}  # times as many samples of what is hardly ever hit: some 200 hits are expected at least
 _MOST_ERRORS = 4.5  # standard errors, of 15 degrees of freedom: one in 2400 by chance, and no seed here is chance
 _LARGEST = 1e6  # times the view
@@ -180,7 +180,7 @@ def _huge_exposed(subject: str) -> Verdict:
             continue
         keys = "sampler=random" if subject in RASTERS else "sampler=random,pattern=shared"
         with prepare(scene, with_keys(subject, keys), size=SIZE) as prepared:
-            for seed in range(_SEEDS):
+            for seed in range(_INSTANTS):
                 x, y, time = sample_set("random", 1, seed=seed, frame=setting.frame)[0, :3]
                 shown = prepared.render(frame=setting.frame, seed=seed).pixels
                 painting = paint(scene, SIZE, frame=setting.frame, fraction=time * scene.animation.shutter)

@@ -61,7 +61,7 @@ def plan_exposure(
     opening, closing = shutter_interval(scene, technique)
     first = view_at(scene.camera, scene.animation, frame, opening, size)
     last = view_at(scene.camera, scene.animation, frame, closing, size) if closing > opening else first
-    start, share = find_start(spheres, scene, (first, last), frame)
+    start, share = find_start(spheres, scene, (first, last), frame, _margin_px(technique))
     anchor_frame = _anchor_frame(scene, frame) if start == 0.0 or scene.camera.is_static else frame
     anchor_view = view_at(scene.camera, scene.animation, anchor_frame, 0.0, size)
     anchor = anchor_view.origin + start * anchor_view.forward
@@ -92,6 +92,13 @@ def shutter_interval(scene: Scene, technique: Technique) -> tuple[float, float]:
     if technique.time == "center" or (is_single and technique.sampler in ("center", "grid")):
         return shutter / 2, shutter / 2
     return 0.0, shutter
+
+
+def _margin_px(technique: Technique) -> float:
+    """Return how far from a pixel's centre its filter has samples, along both axes together, and a pixel more."""
+    # a Gaussian without end is drawn from by numbers of 53 bits, which are no further out
+    radius = technique.radius_px if np.isfinite(technique.radius_px) else 9.0 * technique.sigma_px
+    return float(np.sqrt(2.0) * radius) + 1.0
 
 
 def _anchor_frame(scene: Scene, frame: int) -> int:

@@ -19,7 +19,6 @@ from aliasbench.scenes.projection import View, focus_at
 _FAR = 0.75  # of the reach: where less is empty, two bits are not to be gained
 _LAYERS = 2.0**-5  # of what is beyond: more than all layers together are brought nearer
 _ROUNDING = 2.0**-40  # of the reach: more than float64 may misplace a sphere
-_MARGIN_PX = 64.0  # how far beyond the picture filters may ask
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,11 +48,13 @@ class Spheres:
         return cls(np.concatenate(centers), np.concatenate(velocities), np.concatenate(radii))
 
 
-def find_start(spheres: Spheres, scene: Scene, views: tuple[View, View], frame: int) -> tuple[float, float]:
+def find_start(
+    spheres: Spheres, scene: Scene, views: tuple[View, View], frame: int, margin_px: float = 0.0
+) -> tuple[float, float]:
     """Return the depth before which no ray of a frame meets anything, and which share of what rays reach lies beyond.
 
     Where rays may as well start at the camera these are 0 and 1. `views` are those at the shutter's opening and
-    closing; bodies may be anywhere where they are in the frame's interval.
+    closing; bodies may be anywhere where they are in the frame's interval. Filters ask `margin_px` beyond the picture.
     """
     if not len(spheres.radii):
         return 0.0, 1.0
@@ -73,7 +74,7 @@ def find_start(spheres: Spheres, scene: Scene, views: tuple[View, View], frame: 
         share = min(1.0, max(0.0, float((middle - eye) @ travel) / square)) if square > 0.0 else 0.0
         distance = float(np.linalg.norm(middle - eye - share * travel))
         # a ray's direction has depth 1, and is longest in the corners
-        slope += (np.hypot(first.width, first.height) / 2 + _MARGIN_PX) / first.scale
+        slope += (np.hypot(first.width, first.height) / 2 + margin_px) / first.scale
     elif np.array_equal(first.forward, last.forward):
         distance = min(float((middle - view.origin) @ view.forward) for view in (first, last))
     else:

@@ -45,6 +45,7 @@ def reduced(monkeypatch: pytest.MonkeyPatch) -> None:
     rings, huge = shapes.ring_settings(), shapes.huge_settings()
     monkeypatch.setattr(shapes, "ring_settings", lambda: [rings[k] for k in (1, 2, 5, 9)])
     monkeypatch.setattr(shapes, "huge_settings", lambda: [huge[k] for k in (0, 4, 8, 9, 13, 17)])
+    monkeypatch.setattr(shapes, "_INSTANTS", 4)
 
 
 @pytest.mark.parametrize(("name", "subject"), [(c.name, s) for c in CASES.values() for s in c.subjects])

@@ -51,3 +51,16 @@ def test_the_bound_holds_however_far_an_edge_reaches(far):
     assert frame.uncertainty <= max(1e-12, 1e3 * 2.0**-53 * reach)
     if far == 10.0:
         assert frame.uncertainty == 1e-12
+
+
+@pytest.mark.parametrize("steep", [2.0**-6, 0.5, 8.0])
+@pytest.mark.parametrize("reach", [2.0**5, 2.0**20, 2.0**27])
+def test_the_bound_holds_where_parallel_rays_begin(reach, steep):
+    # depth steep (y - 3/8 x - 1/4), so that all coordinates are exact: what lies above the line is before the camera
+    corners = [(-reach, -reach), (reach, -reach), (0.5 * reach, reach), (-reach, 0.75 * reach)]
+    outline = [(x, y, 4.0 - steep * (y - 0.375 * x - 0.25)) for x, y in corners]
+    scene = Scene("near", Camera("orthographic", (0.0, 0.0, 4.0), height=float(H)), (polygon(outline),))
+    frame = render(scene, "reference:", size=(W, H))
+    error = np.abs(frame.pixels[..., 0] - exact_coverage((0.0, 0.25), (8.0, 3.25))).max()
+    assert error <= frame.uncertainty
+    assert frame.uncertainty <= 1e-12 + 1e-12 * reach * max(1.0, 1.0 / steep)
