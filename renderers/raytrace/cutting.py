@@ -17,6 +17,7 @@ from aliasbench.scenes.projection import View
 
 # What an edge test of three terms rounds by, of the largest coordinate; and what it may misplace, in pixels.
 _ROUNDING, _TOLERANCE_PX = 8.0 * 2.0**-24, 2.0**-8
+PLACED_PX = _TOLERANCE_PX / _ROUNDING  # so far away parallel rays place an edge's ends that well
 _WIDTH = 2.0  # pictures: how wide a tube about an orthographic camera's axis is left whole
 _STEP = 8.0  # between one plane's distance from a pinhole and the next one's
 _MOST_STEPS = 64
@@ -46,7 +47,7 @@ def cut_large(
     reach = np.abs(local).max()
     if not view.perspective:
         tube = _WIDTH / 2.0 * max(view.width, view.height) / view.scale + travel
-        if reach * view.scale * _ROUNDING <= _TOLERANCE_PX or not _leaves_tube(mesh, local, tube).any():
+        if reach * view.scale <= PLACED_PX or not _leaves_tube(mesh, local, tube).any():
             return mesh, None
         distances = [tube]
     else:
@@ -60,37 +61,27 @@ def cut_large(
     return _cut(mesh, [(normal, offset + float(normal @ (view.origin - anchor))) for normal, offset in planes])
 
 
-def cut_about(
-    mesh: Mesh, view: View, place: FloatArray, axes: FloatArray, travel: float
-) -> tuple[Mesh, NDArray[np.int64] | None]:
-    """Return what `cut_large` does, of a mesh that moves: about a place in its frame, of a pinhole or where rays are.
+def first_cut(mesh: Mesh, view: View) -> float:
+    """Return how near the origin of a mesh's frame it must be cut for float32 to place its edges, infinity if never.
 
-    Parameters
-    ----------
-    mesh : Mesh
-    view : View
-        For the picture's measures.
-    place : (3,) float64
-        From which, or about which, the mesh is seen at the middle of the exposure; `travel` is how far from there it is
-        seen at other times.
-    axes : (3, 3) float64
-        Of length 1, right, up and forward.
+    There is a pinhole, or what parallel rays of `view` see; edges may come into sight as the mesh turns.
     """
-    local = (mesh.vertices - place) @ axes.T
-    reach = float(np.abs(local).max())
     if view.perspective:
-        nearest = _nearest_of_misplaced(_edges(mesh), local, view)
-        if nearest == np.inf:
-            return mesh, None
-        nearest = max(nearest, travel)
-    else:
-        nearest = _WIDTH / 2.0 * max(view.width, view.height) / view.scale + travel
-        if reach * view.scale * _ROUNDING <= _TOLERANCE_PX or reach <= _STEP * nearest:
-            return mesh, None
+        return _nearest_of_misplaced(_edges(mesh), mesh.vertices, view, everywhere=True)
+    tube = _WIDTH / 2.0 * max(view.width, view.height) / view.scale
+    reach = float(np.abs(mesh.vertices).max())
+    return tube if reach * view.scale > PLACED_PX and reach > _STEP * tube else np.inf
+
+
+def cut_about(mesh: Mesh, nearest: float, axes: FloatArray) -> tuple[Mesh, NDArray[np.int64]]:
+    """Return a mesh cut at distances from its frame's origin that grow from `nearest` on along `axes` (3, 3), of length
+    1, and of which triangles its triangles are parts.
+    """
+    reach = float(np.linalg.norm(mesh.vertices, axis=1).max())
     steps = min(_MOST_STEPS, 1 + int(np.log(max(reach / nearest, 1.0)) / np.log(_STEP)))
-    distances = [nearest * _STEP**k for k in range(steps)]
-    planes = [(axis, sign * d) for d in distances for axis in axes for sign in (1.0, -1.0)]
-    return _cut(mesh, [(normal, offset + float(normal @ place)) for normal, offset in planes])
+    return _cut(
+        mesh, [(axis, sign * nearest * _STEP**k) for k in range(steps) for axis in axes for sign in (1.0, -1.0)]
+    )
 
 
 def _edges(mesh: Mesh) -> NDArray[np.int64]:
@@ -115,8 +106,10 @@ def _leaves_tube(mesh: Mesh, local: FloatArray, tube: float) -> NDArray[np.bool_
     return out
 
 
-def _nearest_of_misplaced(edges: NDArray[np.int64], local: FloatArray, view: View) -> float:
-    """Return how near the eye edges come that float32 misplaces in the picture, infinity if there is none.
+def _nearest_of_misplaced(
+    edges: NDArray[np.int64], local: FloatArray, view: View, *, everywhere: bool = False
+) -> float:
+    """Return how near the eye edges come that float32 misplaces in the picture, or anywhere, infinity if none does.
 
     An edge's rounding turns it by its largest coordinate over its line's distance from the eye.
     """
@@ -131,7 +124,7 @@ def _nearest_of_misplaced(edges: NDArray[np.int64], local: FloatArray, view: Vie
     wide = np.array([view.width, view.height]) / view.scale * (_WIDTH / 2.0)
     beyond = ends[..., 2:] * wide
     hidden = (ends[..., :2] > beyond).all(axis=1) | (ends[..., :2] < -beyond).all(axis=1)
-    bad = ~np.any(hidden, axis=1) & (near > 0.0) & (length > _STEP * near)
+    bad = (everywhere | ~np.any(hidden, axis=1)) & (near > 0.0) & (length > _STEP * near)
     bad &= reach * view.scale * _ROUNDING > _TOLERANCE_PX * height
     return float(near[bad].min(initial=np.inf))
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aliasbench.renderers.geometry import Body
-from aliasbench.renderers.raytrace.cutting import cut_about
+from aliasbench.renderers.raytrace.cutting import PLACED_PX, cut_about, first_cut
 from aliasbench.renderers.raytrace.exposure import MERGE_LIMIT, Exposure
 from aliasbench.renderers.raytrace.start import Spheres
 from aliasbench.renderers.raytrace.tables import Looks, Mesh, Ownership, body_mesh, build_ownership
@@ -79,7 +79,8 @@ class Moving:
             centers = spheres.centers + seconds * spheres.velocities
             found = np.linalg.norm(centers - eye, axis=1) < _NEAR * spheres.radii
         else:
-            found = spheres.radii * view.scale > _NEAR * max(view.width, view.height)
+            # from anywhere within it
+            found = 2.0 * spheres.radii * view.scale > PLACED_PX
         return np.unique(self._numbers[found]).tolist()
 
     def _divide(self, mesh: Mesh, body: Body, exposure: Exposure) -> tuple[Body, Mesh, Mesh, NDArray[np.int64]] | None:
@@ -87,35 +88,41 @@ class Moving:
 
         A body that is squeezed flat has no frame, and stays whole.
         """
-        shutter, anchor, animation = exposure.shutter, exposure.anchor, self._scene.animation
-        places: list[FloatArray] = []
-        axes: FloatArray = np.eye(3)
-        for share in np.linspace(0.0, 1.0, _TIMES).tolist():
-            fraction = shutter.opening + share * (shutter.closing - shutter.opening)
-            matrix = body.local_matrix(shutter.place(body.motion, animation, fraction), anchor)
-            eye = shutter.first.origin + share * (shutter.last.origin - shutter.first.origin) - anchor
-            if abs(np.linalg.det(matrix[:3, :3])) < np.finfo(np.float64).tiny:
-                return None
-            back = np.linalg.inv(matrix[:3, :3])
-            place, forward = back @ (eye - matrix[:3, 3]), back @ shutter.first.forward
-            places.append(place if shutter.first.perspective else _where_met(body, mesh, place, forward))
-            if share == 0.5:
-                axes = np.asarray(
-                    (back @ np.stack([shutter.first.right, shutter.first.up, shutter.first.forward], axis=1)).T,
-                    dtype=np.float64,
-                )
-        middle = places[_TIMES // 2]
-        travel = max(float(np.linalg.norm(place - middle)) for place in places)
-        nearer = replace(
-            body,
-            origin=body.origin + middle,
-            vertices=body.vertices - middle,
-            plane=np.append(body.plane[:3], body.plane[3] - body.plane[:3] @ middle),
-        )
+        view = exposure.shutter.first
+        middle = self._seen_from(mesh, body, exposure, 0.5)
+        if middle is None:
+            return None
+        place, axes = middle
+        plane = np.append(body.plane[:3], body.plane[3] - body.plane[:3] @ place)
+        nearer = replace(body, origin=body.origin + place, vertices=body.vertices - place, plane=plane)
         whole = replace(mesh, vertices=nearer.vertices)
-        lengths = np.linalg.norm(axes, axis=1, keepdims=True)
-        part, parents = cut_about(whole, shutter.first, np.zeros(3), axes / lengths, travel)
-        return None if parents is None else (nearer, whole, part, parents)
+        nearest = first_cut(whole, view)
+        if nearest == np.inf:
+            return None
+        others = [self._seen_from(mesh, body, exposure, share) for share in np.linspace(0.0, 1.0, _TIMES).tolist()]
+        travel = max(float(np.linalg.norm(other[0] - place)) for other in others if other is not None)
+        part, parents = cut_about(whole, max(nearest, travel) if view.perspective else nearest + travel, axes)
+        return nearer, whole, part, parents
+
+    def _seen_from(
+        self, mesh: Mesh, body: Body, exposure: Exposure, share: float
+    ) -> tuple[FloatArray, FloatArray] | None:
+        """Return from which place in a body's frame, or about which, it is seen at a share of the exposure, and the
+        camera's axes there; None if there is no such frame.
+        """
+        shutter = exposure.shutter
+        fraction = shutter.opening + share * (shutter.closing - shutter.opening)
+        world = shutter.place(body.motion, self._scene.animation, fraction)
+        matrix = body.local_matrix(world, exposure.anchor)
+        if abs(np.linalg.det(matrix[:3, :3])) < np.finfo(np.float64).tiny:
+            return None
+        back = np.linalg.inv(matrix[:3, :3])
+        eye = shutter.first.origin + share * (shutter.last.origin - shutter.first.origin) - exposure.anchor
+        place = back @ (eye - matrix[:3, 3])
+        axes = np.stack([shutter.first.right, shutter.first.up, shutter.first.forward]) @ back.T
+        if not shutter.first.perspective:
+            place = _where_met(body, mesh, place, axes[2])
+        return place, axes / np.linalg.norm(axes, axis=1, keepdims=True)
 
 
 def _where_met(body: Body, mesh: Mesh, place: FloatArray, forward: FloatArray) -> FloatArray:
