@@ -1,6 +1,9 @@
 # Everything is done in .venv; `make run` and `make test` set up what is missing.
 BIN := .venv/bin
 
+# What Python compiles is kept, whatever the caller's environment says: tests start it hundreds of times.
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: run test setup lint types bench clean
 
 run: setup
