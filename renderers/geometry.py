@@ -51,6 +51,8 @@ class Body:
         For each triangle the index of its object in `scene.objects`.
     plane : (4,) float64
         (n, k) of the plane n . x = k that all vertices of a layer above 0 lie in, relative to `origin`; else zeros.
+    stack : int
+        The same for all bodies of layers above 0 that share a plane at rest; -1 in layer 0.
     """
 
     motion: Motion
@@ -61,6 +63,7 @@ class Body:
     uv: FloatArray
     surfaces: NDArray[np.int32]
     plane: FloatArray
+    stack: int
 
     def local_matrix(self, world: FloatArray, eye: FloatArray) -> FloatArray:
         """Return the (4, 4) float64 matrix from body vertices to the world relative to `eye`.
@@ -79,10 +82,10 @@ def build_bodies(scene: Scene) -> tuple[Body, ...]:
     for index, surface in enumerate(scene.objects):
         layer = int(layers[index])
         groups.setdefault((_effective(surface.motion), layer, planes[index] if layer else -1), []).append(index)
-    return tuple(_build_body(scene, motion, layer, members) for (motion, layer, _), members in groups.items())
+    return tuple(_build_body(scene, *key, members) for key, members in groups.items())
 
 
-def _build_body(scene: Scene, motion: Motion, layer: int, members: list[int]) -> Body:
+def _build_body(scene: Scene, motion: Motion, layer: int, stack: int, members: list[int]) -> Body:
     surfaces = [scene.objects[i] for i in members]
     world = np.concatenate([s.vertices for s in surfaces])
     origin = (world.min(axis=0) + world.max(axis=0)) / 2 if len(world) else np.zeros(3)
@@ -100,6 +103,7 @@ def _build_body(scene: Scene, motion: Motion, layer: int, members: list[int]) ->
         np.concatenate([s.uv if s.uv is not None else np.zeros((len(s.vertices), 2)) for s in surfaces]),
         np.concatenate([np.full(len(s.triangles), i, np.int32) for i, s in zip(members, surfaces, strict=True)]),
         plane,
+        stack,
     )
 
 

@@ -109,6 +109,8 @@ def find_borders(
         a, b, depth, inner = _shown_edges(local, surface, view, box)
         off = (ROUNDINGS * reach + ROUNDINGS_64 * far) * view.scale / depth + (SNAPPED_PX if snapped else 0.0)
         found.append((a, b, off, inner))
+        if not view.perspective:
+            found.append(_begins(local, surface, view, ROUNDINGS * reach + ROUNDINGS_64 * far))
         planes.append((_depths(local, view), reach))
     for i, (one, reach) in enumerate(planes):
         for other, beyond in planes[:i]:
@@ -154,6 +156,30 @@ def _shown_edges(
     scale = [view.scale / np.maximum(v[:, 2:], 1e-300) if view.perspective else view.scale for v in (a, b)]
     a, b = (half + v[:, :2] * (1.0, -1.0) * s for v, s in zip((a, b), scale, strict=True))
     return a, b, depth, uses[kept] > 1
+
+
+def _begins(
+    local: FloatArray, surface: Surface, view: View, rounding: float
+) -> tuple[FloatArray, FloatArray, FloatArray, NDArray[np.bool_]]:
+    """Lines at which parallel rays begin to see what passes through the camera's plane, and how far they may be off."""
+    half = np.array([view.width / 2, view.height / 2])
+    ends, off = [], []
+    for corners in local[surface.triangles]:
+        following = np.roll(corners, -1, axis=0)
+        passing = (corners[:, 2] < 0.0) != (following[:, 2] < 0.0)
+        normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
+        across = float(np.hypot(normal[0], normal[1]))
+        if passing.sum() != 2 or across == 0.0:
+            continue
+        share = corners[passing, 2] / (corners[passing, 2] - following[passing, 2])
+        points = corners[passing] + share[:, None] * (following[passing] - corners[passing])
+        ends.append(half + points[:, :2] * (1.0, -1.0) * view.scale)
+        # a distance from the plane, over the share of its normal that is across the rays
+        off.append(rounding * float(np.linalg.norm(normal)) / across * view.scale)
+    if not ends:
+        return _NOTHING
+    lines = np.array(ends)
+    return lines[:, 0], lines[:, 1], np.array(off), np.zeros(len(lines), bool)
 
 
 def _depths(local: FloatArray, view: View) -> FloatArray | None:

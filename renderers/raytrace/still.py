@@ -85,16 +85,18 @@ class Still:
         self._key, self._through, self._thin = exposure.mesh_key, through, thin
 
     def _merge(self, exposure: Exposure) -> None:
-        camera = self._scene.camera
-        layers = [np.full(len(b.triangles), b.layer, np.int32) for b in exposure.still]
-        self._layers = np.concatenate([np.zeros(0, np.int32), *layers])
+        camera, bodies = self._scene.camera, exposure.still
         is_pinhole = camera.projection == "perspective" and camera.lens_radius == 0.0
-        if not is_pinhole or self._lit:
-            self._layers[:] = 0
-        layered = not self._layers.any()
-        self._whole = merge_bodies(
-            self._scene, self._looks, exposure.still, exposure.shutter, exposure.anchor, layered=layered
-        )
+        # layers that move are scaled about the eye and not tilted: so all of one plane have to be
+        moving = {body.stack for body in exposure.moving if body.layer}
+        tilted = [is_pinhole and not self._lit and body.layer > 0 and body.stack not in moving for body in bodies]
+        layers = [
+            np.full(len(body.triangles), body.layer * is_tilted, np.int32)
+            for body, is_tilted in zip(bodies, tilted, strict=True)
+        ]
+        self._layers = np.concatenate([np.zeros(0, np.int32), *layers])
+        scaled = [body.layer * (not is_tilted) for body, is_tilted in zip(bodies, tilted, strict=True)]
+        self._whole = merge_bodies(self._scene, self._looks, bodies, exposure.shutter, exposure.anchor, scaled)
         self._of_whole = build_ownership((self._whole,), placed=self._placed)
 
     def _cut(self, exposure: Exposure, through: Numbers) -> None:

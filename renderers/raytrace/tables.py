@@ -88,18 +88,23 @@ def body_mesh(body: Body, looks: "Looks") -> Mesh:
 
 
 def merge_bodies(
-    scene: Scene, looks: "Looks", bodies: Sequence[Body], shutter: Shutter, anchor: FloatArray, *, layered: bool
+    scene: Scene,
+    looks: "Looks",
+    bodies: Sequence[Body],
+    shutter: Shutter,
+    anchor: FloatArray,
+    layers: Sequence[int],
 ) -> Mesh:
     """Return bodies as they stand when the shutter opens, relative to `anchor`, as one mesh.
 
-    `layered`: higher layers are brought nearer.
+    Each is brought nearer by as many `layers`.
     """
     vertices, triangles, count = [np.zeros((0, 3))], [np.zeros((0, 3), np.int32)], 0
-    for body in bodies:
+    for body, layer in zip(bodies, layers, strict=True):
         world = shutter.place(body.motion, scene.animation, shutter.opening)
         matrix = body.local_matrix(world, anchor)
-        if layered and body.layer:
-            matrix = layer_matrix(shutter.first, body.layer, shutter.layer_depth, anchor) @ matrix
+        if layer:
+            matrix = layer_matrix(shutter.first, layer, shutter.layer_depth, anchor) @ matrix
         vertices.append(body.vertices @ matrix[:3, :3].T + matrix[:3, 3])
         triangles.append(body.triangles + np.int32(count))
         count += len(body.vertices)

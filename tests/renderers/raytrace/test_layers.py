@@ -9,7 +9,7 @@ from aliasbench.bench.hard.painting import paint
 from aliasbench.renderers.catalog import render
 from aliasbench.renderers.raytrace.layers import bring_nearer, nearest_of_deep, plane_distances
 from aliasbench.renderers.raytrace.tables import Mesh
-from aliasbench.scenes.model import Animation, Camera, Checker, Scene
+from aliasbench.scenes.model import Animation, Camera, Checker, Motion, Scene
 from aliasbench.scenes.projection import view_at
 from aliasbench.scenes.shapes import polygon
 
@@ -83,3 +83,25 @@ def test_textures_of_layers_stay_where_they_are(technique: str) -> None:
     seen = np.isin(alone[..., 2], np.float32([0.3, 0.7]))
     assert 0.2 < seen.mean() < 0.8
     np.testing.assert_array_equal(above[seen], alone[seen])
+
+
+@pytest.mark.parametrize("technique", TRACERS)
+@pytest.mark.parametrize("moves", [(0,), (1,), (2,), (0, 2), (0, 1, 2)])
+def test_what_slides_in_a_plane_keeps_its_place_among_what_stands_there(moves: tuple[int, ...], technique: str) -> None:
+    camera = Camera("perspective", (0.0, 2.0, 0.0), (0.0, 1.2, -9.0), fov_y_deg=50.0)
+    corners = np.array([(-90.0, 0.0, 5.0), (90.0, 0.0, 5.0), (90.0, 0.0, -150.0), (-90.0, 0.0, -150.0)])
+    motion = Motion((0.3, 0.0, -0.2))
+    objects = tuple(
+        polygon(corners * (1.0 - 0.1 * k), color=color, motion=motion if k in moves else None)
+        for k, color in enumerate([(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)])
+    )
+    # another plane has layers of its own, which stand
+    wall = np.array([(-20.0, 0.5, -200.0), (20.0, 0.5, -200.0), (20.0, 9.0, -200.0), (-20.0, 9.0, -200.0)])
+    walls = tuple(polygon(wall, color=color) for color in ((1.0, 0.0, 1.0), (1.0, 1.0, 1.0)))
+    scene = Scene("sliding", camera, (*objects, *walls), animation=Animation(1.0, 2, 1.0))
+    key = "spp=4" if technique.endswith(":") else ",spp=4"
+    pixels = render(scene, technique + key, size=SIZE).pixels
+    covered = (pixels == (0.0, 0.0, 1.0)).all(axis=2)
+    assert covered[SIZE[1] // 2 + 10 :].all()  # below the far edges of the first two
+    assert not (pixels == (1.0, 0.0, 1.0)).all(axis=2).any()
+    assert (pixels == (1.0, 1.0, 1.0)).all(axis=2).sum() > 20
