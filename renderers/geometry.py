@@ -26,6 +26,7 @@ from aliasbench.scenes.projection import View
 LAYER_STEP = 2.0**-18
 # The same for two planes whose corners, at most 8 times as far away as a hit, are rounded by half an ulp each.
 LAYER_TILT = 2.0**-18
+_MOST_TILT = 2.0**-14  # of all layers of a plane together: a sixteen thousandth of the distance above it
 _WIDEST = 4.0  # pictures: what of a layered surface is farther out of sight does not count
 MOST_LAYERS = 4096  # together 1.6 % of the distance; beyond, more and more would be brought before what is nearer
 _AT_ONCE = 64  # outlines that are cut with another at a time
@@ -51,8 +52,10 @@ class Body:
         For each triangle the index of its object in `scene.objects`.
     plane : (4,) float64
         (n, k) of the plane n . x = k that all vertices of a layer above 0 lie in, relative to `origin`; else zeros.
-    stack : int
-        The same for all bodies of layers above 0 that share a plane at rest; -1 in layer 0.
+    tilt : float
+        By how much the layer is brought nearer where rays graze its plane, see `LAYER_TILT`.
+    stacked : (m,) bool
+        Which triangles lie in a plane that has layers.
     """
 
     motion: Motion
@@ -63,7 +66,8 @@ class Body:
     uv: FloatArray
     surfaces: NDArray[np.int32]
     plane: FloatArray
-    stack: int
+    tilt: float
+    stacked: NDArray[np.bool_]
 
     def local_matrix(self, world: FloatArray, eye: FloatArray) -> FloatArray:
         """Return the (4, 4) float64 matrix from body vertices to the world relative to `eye`.
@@ -78,21 +82,26 @@ class Body:
 def build_bodies(scene: Scene) -> tuple[Body, ...]:
     """Return the scene's triangles grouped by motion, layer and, above layer 0, plane, as they first appear."""
     layers, planes = _stack_planes(scene)
+    highest: dict[int, int] = {}
+    for plane, layer in zip(planes, layers.tolist(), strict=True):
+        highest[plane] = max(highest.get(plane, 0), layer)
+    tops = np.array([highest[plane] for plane in planes], np.int64)
     groups: dict[tuple[Motion, int, int], list[int]] = {}
     for index, surface in enumerate(scene.objects):
         layer = int(layers[index])
         groups.setdefault((_effective(surface.motion), layer, planes[index] if layer else -1), []).append(index)
-    return tuple(_build_body(scene, *key, members) for key, members in groups.items())
+    return tuple(_build_body(scene, motion, layer, tops, members) for (motion, layer, _), members in groups.items())
 
 
-def _build_body(scene: Scene, motion: Motion, layer: int, stack: int, members: list[int]) -> Body:
+def _build_body(scene: Scene, motion: Motion, layer: int, tops: NDArray[np.int64], members: list[int]) -> Body:
     surfaces = [scene.objects[i] for i in members]
     world = np.concatenate([s.vertices for s in surfaces])
     origin = (world.min(axis=0) + world.max(axis=0)) / 2 if len(world) else np.zeros(3)
-    plane = np.zeros(4)
+    plane, tilt = np.zeros(4), 0.0
     if layer:
         normal, offset = _plane_of(surfaces[0])
         plane = np.append(normal, offset - normal @ origin)
+        tilt = layer * min(LAYER_TILT, _MOST_TILT / float(tops[members[0]]))
     starts = np.cumsum([0] + [len(s.vertices) for s in surfaces[:-1]])
     return Body(
         motion,
@@ -103,7 +112,8 @@ def _build_body(scene: Scene, motion: Motion, layer: int, stack: int, members: l
         np.concatenate([s.uv if s.uv is not None else np.zeros((len(s.vertices), 2)) for s in surfaces]),
         np.concatenate([np.full(len(s.triangles), i, np.int32) for i, s in zip(members, surfaces, strict=True)]),
         plane,
-        stack,
+        tilt,
+        np.concatenate([np.full(len(s.triangles), tops[i] > 0) for i, s in zip(members, surfaces, strict=True)]),
     )
 
 

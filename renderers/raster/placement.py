@@ -25,7 +25,7 @@ class Placement:
     origins, radii : (n, 3), (n,) float64
         Every body's origin at rest, and the largest distance of its vertices from it.
     layers : (n,) float64
-    planes : (n, 4) float64
+    planes, tilts : (n, 4), (n,) float64
         Those of layers above 0, see `geometry.Body`.
     velocities, axes, centers : (n, 3) float64
     rates : (n,) float64
@@ -39,6 +39,7 @@ class Placement:
     radii: FloatArray
     layers: FloatArray
     planes: FloatArray
+    tilts: FloatArray
     velocities: FloatArray
     axes: FloatArray
     centers: FloatArray
@@ -56,6 +57,7 @@ def make_placement(bodies: Sequence[Body]) -> Placement:
         read_only(np.array([float(np.linalg.norm(b.vertices, axis=1).max(initial=0.0)) for b in bodies])),
         read_only(np.array([float(b.layer) for b in bodies])),
         read_only(np.array([b.plane for b in bodies]).reshape(-1, 4)),
+        read_only(np.array([b.tilt for b in bodies])),
         read_only(np.array([b.motion.velocity for b in bodies]).reshape(-1, 3)),
         read_only(axes / np.linalg.norm(axes, axis=1, keepdims=True)),
         read_only(np.array([s.center for s in spins]).reshape(-1, 3)),

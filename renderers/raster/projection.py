@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from aliasbench.renderers.geometry import LAYER_STEP, LAYER_TILT, layered_depth
+from aliasbench.renderers.geometry import LAYER_STEP, layered_depth
 from aliasbench.renderers.raster.placement import Placement, body_matrices
 from aliasbench.scenes.errors import InputError
 from aliasbench.scenes.model import Camera, FloatArray, Scene
@@ -153,7 +153,7 @@ def layer_tilts(scene: Scene, placement: Placement, instant: Instant, size: tupl
     if not view.perspective:
         return placement.layers * (-LAYER_STEP * layered_depth(placement.bodies, view) / (_FAR * farthest))
     heights = np.maximum(_eye_heights(placement.planes, local), _LEAST_HEIGHT * farthest)
-    out: FloatArray = placement.layers * (LAYER_TILT * _NEAR * farthest / heights)
+    out: FloatArray = placement.tilts * (_NEAR * farthest / heights)
     return out
 
 

@@ -5,8 +5,9 @@ and a second traversal), and interpolates in float32 between at most 129 poses; 
 needs no rebuilding between frames, and lets both engines trace the same rays. The price grows with the number of moving
 bodies that a pixel may see, hence each has the rectangle of the picture that it can reach.
 
-A body's point b lies at x = s R(t)(b + pivot) + a0 + a1 t relative to the anchor, t in [0, 1) over the shutter (spin
-and velocity), or at x = (M0 + t M1) b + a0 + a1 t (two matrices). s and part of a0, a1 bring higher layers nearer.
+A body's point b lies at x = R(t)(b + pivot) + a0 + a1 t relative to the anchor, t in [0, 1) over the shutter (spin and
+velocity), or at x = (M0 + t M1) b + a0 + a1 t (two matrices). Of coplanar bodies the higher layer wins: depths at which
+rays meet it are compared as if it were nearer (`nearer`), wherever they come from.
 """
 
 from dataclasses import dataclass
@@ -44,11 +45,14 @@ from aliasbench.scenes.model import Animation, FloatArray, Motion, Scene
 from aliasbench.scenes.motion import object_matrix, spin_turns
 from aliasbench.scenes.projection import View
 
-# Values of a body: kind, axis, turns at opening, turns over the shutter, a0, a1, 1 / s, pivot; or M0 and M1; rectangle.
-KIND, SPIN_AXIS, TURNS, TURNS_TRAVEL, SHIFT, SHIFT_TRAVEL, INVERSE_SCALE, PIVOT = 0, 1, 4, 5, 6, 9, 12, 13
+# Values of a body: kind, axis, turns at opening, turns over the shutter, a0, a1, pivot; or M0 and M1; rectangle; and
+# how its layer is brought nearer, by a share of the depth, one that grows with depth, and a distance.
+KIND, SPIN_AXIS, TURNS, TURNS_TRAVEL, SHIFT, SHIFT_TRAVEL, PIVOT = 0, 1, 4, 5, 6, 9, 12
 MATRIX, MATRIX_TRAVEL, BOUNDS = 16, 25, 34
-BODY_SIZE = 38
+STEP, TILT, SLIDE = 38, 39, 40
+BODY_SIZE = 41
 RIGID, LINEAR = 0.0, 1.0
+LEAST_HEIGHT = 2.0**-20  # of an eye above a plane, of how far the plane reaches: nearer, it is seen as a line
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -78,32 +82,20 @@ class Shutter:
         return (1.0 - fraction) * begin + fraction * end
 
 
-def layer_matrix(view: View, layer: int, layer_depth: float, anchor: FloatArray) -> FloatArray:
-    """Return the (4, 4) matrix that brings points (relative to `anchor`) k layers nearer without moving their image.
-
-    Perspective scales about the eye, where `layer_depth` is a factor; parallel rays are followed backwards by a share
-    of it.
-    """
-    out = np.eye(4)
-    step = layer * LAYER_STEP * layer_depth
-    if view.perspective:
-        out[:3, :3] *= 1.0 - step
-        out[:3, 3] = step * (view.origin - anchor)
-    else:
-        out[:3, 3] = -step * view.forward
-    return out
-
-
 def body_values(scene: Scene, body: Body, shutter: Shutter, anchor: FloatArray) -> FloatArray:
     """Return the (BODY_SIZE,) values of one body over one exposure."""
     out = np.zeros(BODY_SIZE)
     motion, animation = body.motion, scene.animation
     ends = [
-        layer_matrix(view, body.layer, shutter.layer_depth, anchor)
-        @ body.local_matrix(shutter.place(motion, animation, fraction), anchor)
-        for view, fraction in ((shutter.first, shutter.opening), (shutter.last, shutter.closing))
+        body.local_matrix(shutter.place(motion, animation, fraction), anchor)
+        for fraction in (shutter.opening, shutter.closing)
     ]
-    out[INVERSE_SCALE] = 1.0
+    if body.layer:
+        step = body.layer * LAYER_STEP * shutter.layer_depth
+        if shutter.first.perspective:
+            out[STEP], out[TILT] = step, _tilt(body, ends, shutter, anchor)
+        else:
+            out[SLIDE] = step
     if motion.spin is not None and not shutter.interpolated:
         pivot = np.asarray(motion.spin.center, dtype=np.float64)
         pivot_ends = [m[:3, :3] @ (pivot - body.origin) + m[:3, 3] for m in ends]
@@ -114,8 +106,6 @@ def body_values(scene: Scene, body: Body, shutter: Shutter, anchor: FloatArray) 
         out[TURNS_TRAVEL] = motion.spin.rev_per_s / animation.fps * (shutter.closing - shutter.opening)
         out[SHIFT : SHIFT + 3] = pivot_ends[0]
         out[SHIFT_TRAVEL : SHIFT_TRAVEL + 3] = pivot_ends[1] - pivot_ends[0]
-        if shutter.first.perspective:
-            out[INVERSE_SCALE] = 1.0 / (1.0 - body.layer * LAYER_STEP * shutter.layer_depth)
         out[PIVOT : PIVOT + 3] = body.origin - pivot
     else:
         out[KIND] = LINEAR
@@ -125,6 +115,21 @@ def body_values(scene: Scene, body: Body, shutter: Shutter, anchor: FloatArray) 
         out[SHIFT_TRAVEL : SHIFT_TRAVEL + 3] = (ends[1] - ends[0])[:3, 3]
     out[BOUNDS : BOUNDS + 4] = _image_bounds(body, ends, shutter, anchor, out)
     return out
+
+
+def _tilt(body: Body, ends: list[FloatArray], shutter: Shutter, anchor: FloatArray) -> float:
+    """Return the share, for each unit of depth, by which a layer is nearer where rays graze its plane."""
+    heights, reach = [], 0.0
+    for matrix, view in zip(ends, (shutter.first, shutter.last), strict=True):
+        corners = (body.vertices @ matrix[:3, :3].T + matrix[:3, 3] - (view.origin - anchor))[body.triangles]
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        largest = int(np.argmax((normal * normal).sum(axis=1)))
+        length = float(np.linalg.norm(normal[largest]))
+        heights.append(abs(float(normal[largest] @ corners[largest, 0])) / length if length > 0.0 else 0.0)
+        reach = max(reach, float(np.abs(corners).max()))
+    # in the plane but for rounding, it is seen as a line
+    height = max(min(heights), LEAST_HEIGHT * reach)
+    return body.tilt * shutter.layer_depth / height if height > 0.0 else 0.0
 
 
 def _image_bounds(
@@ -176,17 +181,16 @@ def _rigid_lane(values: FloatArray, scratch: FloatArray, i: int) -> None:
     time = scratch[TIME + i]
     turns = values[TURNS] + time * values[TURNS_TRAVEL]
     c, s = cos_turns(turns), sin_turns(turns)
-    scale = values[INVERSE_SCALE]
-    x = scale * (scratch[OX + i] - values[SHIFT] - time * values[SHIFT_TRAVEL])
-    y = scale * (scratch[OY + i] - values[SHIFT + 1] - time * values[SHIFT_TRAVEL + 1])
-    z = scale * (scratch[OZ + i] - values[SHIFT + 2] - time * values[SHIFT_TRAVEL + 2])
+    x = scratch[OX + i] - values[SHIFT] - time * values[SHIFT_TRAVEL]
+    y = scratch[OY + i] - values[SHIFT + 1] - time * values[SHIFT_TRAVEL + 1]
+    z = scratch[OZ + i] - values[SHIFT + 2] - time * values[SHIFT_TRAVEL + 2]
     lx, ly, lz = turn_back(values, c, s, x, y, z)
     scratch[LX + i], scratch[LY + i], scratch[LZ + i] = (
         lx - values[PIVOT],
         ly - values[PIVOT + 1],
         lz - values[PIVOT + 2],
     )
-    mx, my, mz = turn_back(values, c, s, scale * scratch[DX + i], scale * scratch[DY + i], scale * scratch[DZ + i])
+    mx, my, mz = turn_back(values, c, s, scratch[DX + i], scratch[DY + i], scratch[DZ + i])
     scratch[MX + i], scratch[MY + i], scratch[MZ + i] = mx, my, mz
 
 
@@ -238,6 +242,27 @@ def lane_to_body(values: FloatArray, scratch: FloatArray, i: int) -> None:
         _rigid_lane(values, scratch, i)
     else:
         _linear_lane(values, scratch, i)
+
+
+@inlined
+def nearer(values: FloatArray, start: float, t: float) -> float:
+    """Return where a hit of a body counts, for rays that start at a depth."""
+    depth = start + t
+    return depth / (1.0 + values[STEP] + values[TILT] * depth) - values[SLIDE] - start
+
+
+@inlined
+def farther(values: FloatArray, start: float, t: float) -> float:
+    """Return where a body must be hit to count at t: the inverse of `nearer`."""
+    depth = start + t + values[SLIDE]
+    rest = 1.0 - values[TILT] * depth if t < np.inf else 0.0
+    return depth * (1.0 + values[STEP]) / rest - start if rest > 0.0 else np.inf
+
+
+@inlined
+def has_layer(values: FloatArray) -> bool:
+    """Return whether a body is brought nearer."""
+    return values[STEP] > 0.0 or values[SLIDE] > 0.0
 
 
 @inlined

@@ -44,21 +44,25 @@ def cut_large(
         return mesh, None
     axes = np.stack([view.right, view.up, view.forward], axis=1)
     local = (mesh.vertices - (view.origin - anchor)) @ axes
-    reach = np.abs(local).max()
+    reach = float(np.abs(local).max())
     if not view.perspective:
         tube = _WIDTH / 2.0 * max(view.width, view.height) / view.scale + travel
         if reach * view.scale <= PLACED_PX or not _leaves_tube(mesh, local, tube).any():
             return mesh, None
-        distances = [tube]
+        distances = [tube * _STEP**k for k in range(_steps(reach, tube))]
     else:
         nearest = min(nearest, _nearest_of_misplaced(_outline(mesh) if robust else _edges(mesh), local, view))
         if nearest == np.inf:
             return mesh, None
-        steps = min(_MOST_STEPS, 1 + int(np.log(max(reach / nearest, 1.0)) / np.log(_STEP)))
-        distances = [float(nearest * _STEP**k) for k in range(steps)]
+        distances = [nearest * _STEP**k for k in range(_steps(reach, nearest))]
     sides = range(3 if view.perspective else 2)
     planes = [(axes[:, k], sign * d) for d in distances for k in sides for sign in (1.0, -1.0)]
     return _cut(mesh, [(normal, offset + float(normal @ (view.origin - anchor))) for normal, offset in planes])
+
+
+def _steps(reach: float, nearest: float) -> int:
+    """Return how many cuts there are between the nearest and what reaches that far."""
+    return min(_MOST_STEPS, 1 + int(np.log(max(reach / nearest, 1.0)) / np.log(_STEP)))
 
 
 def first_cut(mesh: Mesh, view: View) -> float:

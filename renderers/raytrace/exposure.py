@@ -55,13 +55,24 @@ class Exposure:
 
 
 def plan_exposure(
-    scene: Scene, technique: Technique, size: tuple[int, int], bodies: Sequence[Body], spheres: Spheres, frame: int
+    scene: Scene,
+    technique: Technique,
+    size: tuple[int, int],
+    bodies: Sequence[Body],
+    spheres: Spheres,
+    frame: int,
+    *,
+    lit: bool = False,
 ) -> Exposure:
-    """Return what frame number `frame` is made from; a function of the frame alone, not of what came before."""
+    """Return what frame number `frame` is made from; a function of the frame alone, not of what came before.
+
+    `lit`: rays do not all come from the camera.
+    """
     opening, closing = shutter_interval(scene, technique)
     first = view_at(scene.camera, scene.animation, frame, opening, size)
     last = view_at(scene.camera, scene.animation, frame, closing, size) if closing > opening else first
-    start, share = find_start(spheres, scene, (first, last), frame, _margin_px(technique))
+    span = (frame + opening) / scene.animation.fps, (frame + closing) / scene.animation.fps
+    start, share = find_start(spheres, scene, (first, last), span, _margin_px(technique))
     anchor_frame = _anchor_frame(scene, frame) if start == 0.0 or scene.camera.is_static else frame
     anchor_view = view_at(scene.camera, scene.animation, anchor_frame, 0.0, size)
     anchor = anchor_view.origin + start * anchor_view.forward
@@ -69,17 +80,21 @@ def plan_exposure(
     depth = share if first.perspective else layered_depth(bodies, first, travel, start)
     is_matrix = technique.motion == "matrix"
     shutter = Shutter(frame, opening, closing, first, last, depth, scene.camera.lens_radius, is_matrix)
-    # A layer above others is brought towards the eye, and so moves with it.
-    apart = [not b.motion.is_static or (b.layer > 0 and not scene.camera.is_static) for b in bodies]
-    restless = [b for b, is_apart in zip(bodies, apart, strict=True) if is_apart]
-    if opening == closing and sum(len(b.triangles) for b in restless) <= MERGE_LIMIT:
-        key = (anchor_frame, start, frame) if restless else (anchor_frame, start)
-        return Exposure(shutter, anchor, anchor_view, travel, tuple(bodies), (), False, key, start)
-    still = tuple(b for b, is_apart in zip(bodies, apart, strict=True) if not is_apart)
+    # a layer above others is brought towards the eye in one mesh with them, where all rays come from one eye
+    no_eye = lit or scene.camera.lens_radius > 0.0
+    apart = [body.layer > 0 and no_eye for body in bodies]
+    restless = [not b.motion.is_static or (b.layer > 0 and not scene.camera.is_static) for b in bodies]
+    key: tuple[float, ...] = (anchor_frame, start)
+    count = sum(len(b.triangles) for b, is_restless in zip(bodies, restless, strict=True) if is_restless)
+    if opening == closing and count <= MERGE_LIMIT:
+        key = (*key, frame) if any(restless) else key
+    else:
+        apart = [a or b for a, b in zip(apart, restless, strict=True)]
+    still = tuple(body for body, is_apart in zip(bodies, apart, strict=True) if not is_apart)
+    moving = tuple(body for body, is_apart in zip(bodies, apart, strict=True) if is_apart)
     camera_moves = closing > opening and not scene.camera.is_static
-    has_times = bool(restless) or camera_moves
-    key = (anchor_frame, start)
-    return Exposure(shutter, anchor, anchor_view, travel, still, tuple(restless), has_times, key, start)
+    has_times = bool(moving) or camera_moves
+    return Exposure(shutter, anchor, anchor_view, travel, still, moving, has_times, key, start)
 
 
 def shutter_interval(scene: Scene, technique: Technique) -> tuple[float, float]:

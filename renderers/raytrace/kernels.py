@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from aliasbench.renderers.kernel_parts import called, inlined
 from aliasbench.renderers.raytrace.blurs import fill_film_lens, fill_film_times, picture_reach
-from aliasbench.renderers.raytrace.bodies import fill_body_rays, may_see, to_body
+from aliasbench.renderers.raytrace.bodies import farther, fill_body_rays, has_layer, may_see, nearer, to_body
 from aliasbench.renderers.raytrace.embree import library_path, load_library
 from aliasbench.renderers.raytrace.film import Film, add_even, add_runs, is_even, next_runs, place_even, place_runs
 from aliasbench.renderers.raytrace.lanes import (
@@ -138,8 +138,13 @@ def trace_bodies(
     for body in range(len(scenes)):
         if not may_see(tables.bodies[body], left, right, top, bottom):
             continue
-        to_body(tables.bodies[body], work.scratch)
+        values = tables.bodies[body]
+        to_body(values, work.scratch)
         fill_body_rays(work.scratch, work.ray, work.body_ray, start)
+        layered = has_layer(values)
+        if layered:
+            for i in range(LANES):
+                work.body_ray[RAY_TFAR + i] = np.float32(farther(values, start, np.float64(work.ray[RAY_TFAR + i])))
         for i in range(LANES):
             work.body_ids[HIT_GEOM + i] = NOTHING
             work.body_ids[HIT_INSTANCE + i] = NOTHING
@@ -149,6 +154,8 @@ def trace_bodies(
             if work.body_ids[HIT_GEOM + i] != NOTHING:
                 work.hits[i] = first + work.body_ids[HIT_PRIM + i]
                 work.ray[RAY_TFAR + i] = work.body_ray[RAY_TFAR + i]
+                if layered:
+                    work.ray[RAY_TFAR + i] = np.float32(nearer(values, start, np.float64(work.ray[RAY_TFAR + i])))
 
 
 @called

@@ -4,7 +4,7 @@ A plane is known to some ulp of the distance of its corners, and a ray that graz
 late: at distance z, seen from a height d above the plane, by z / d times as many ulp of z. Two polygons in one plane
 need to be that far apart. Scaled about the eye by 1 / (1 + k (step + tilt z / d)), which takes a plane to a plane and
 leaves every point of the picture where it is, layer k is: raised by k step of the eye's height above the plane, and
-tilted by k tilt.
+tilted by k tilt. Layers that move, or are seen through a lens or by scattered light, are bodies (`bodies.nearer`).
 """
 
 from dataclasses import replace
@@ -12,13 +12,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from aliasbench.renderers.geometry import LAYER_STEP, LAYER_TILT
+from aliasbench.renderers.raytrace.bodies import LEAST_HEIGHT
 from aliasbench.renderers.raytrace.tables import Mesh
 from aliasbench.scenes.model import FloatArray
 from aliasbench.scenes.projection import View
 
 _DEEP = 16.0
-_LEAST_HEIGHT = 2.0**-20
 _LEAST = 0.5  # of a factor's inverse; only what is behind the camera comes below
 
 
@@ -35,20 +34,25 @@ def plane_distances(mesh: Mesh, eye: FloatArray, count: int) -> FloatArray:
 
 
 def bring_nearer(
-    mesh: Mesh, layers: NDArray[np.int32], distances: FloatArray, view: View, anchor: FloatArray, share: float
+    mesh: Mesh,
+    steps: FloatArray,
+    tilts: FloatArray,
+    distances: FloatArray,
+    view: View,
+    anchor: FloatArray,
+    most: float = np.inf,
 ) -> Mesh:
-    """Return a mesh with its triangles of layers (m,) above 0 nearer to the eye, in the same place of the picture.
+    """Return a mesh with its triangles nearer to the eye by steps and tilts (m,), in the same place of the picture.
 
-    `distances` (objects,) are those of the objects' planes from the eye; `share`, of what rays reach, is beyond their
-    start.
+    `distances` (objects,) are those of the objects' planes from the eye; by a share of `most` nothing is nearer.
     """
-    rows = np.flatnonzero(layers)
+    rows = np.flatnonzero(steps)
     eye = view.origin - anchor
     local = mesh.vertices[mesh.triangles[rows]] - eye
-    height = distances[mesh.owners[rows]]
-    tilt = np.divide(LAYER_TILT, height, out=np.zeros_like(height), where=height > 0.0)
-    steps = layers[rows][:, None] * share * (LAYER_STEP + tilt[:, None] * (local @ view.forward))
-    nearer = eye + local / np.maximum(1.0 + steps, _LEAST)[..., None]
+    height = np.maximum(distances[mesh.owners[rows]], LEAST_HEIGHT * np.abs(local).max(axis=(1, 2)))
+    tilt = np.divide(tilts[rows], height, out=np.zeros_like(height), where=height > 0.0)
+    shares = steps[rows][:, None] + tilt[:, None] * (local @ view.forward)
+    nearer = eye + local / np.maximum(1.0 + np.minimum(shares, most), _LEAST)[..., None]
     triangles = mesh.triangles.copy()
     triangles[rows] = len(mesh.vertices) + np.arange(3 * len(rows), dtype=np.int32).reshape(-1, 3)
     return replace(
@@ -59,14 +63,15 @@ def bring_nearer(
     )
 
 
-def nearest_of_deep(mesh: Mesh, layers: NDArray[np.int32], distances: FloatArray, eye: FloatArray) -> float:
-    """Return how near the eye planes with layers come that reach far beyond, infinity if none does.
+def nearest_of_deep(mesh: Mesh, stacked: NDArray[np.bool_], distances: FloatArray, eye: FloatArray) -> float:
+    """Return how near the eye planes with layers, of triangles that are `stacked` (m,), come that reach far beyond;
+    infinity if none does.
 
     So deep a triangle's corners are rounded by more than layers are apart where it is near.
     """
-    rows = np.flatnonzero(layers)
+    rows = np.flatnonzero(stacked)
     reach = np.linalg.norm(mesh.vertices[mesh.triangles[rows]] - eye, axis=2).max(axis=1)
     height = distances[mesh.owners[rows]]
     deep = (reach > _DEEP * height) & (height > 0.0)
     # in the plane but for rounding, it is seen as a line
-    return float(np.maximum(height, _LEAST_HEIGHT * reach)[deep].min(initial=np.inf))
+    return float(np.maximum(height, LEAST_HEIGHT * reach)[deep].min(initial=np.inf))

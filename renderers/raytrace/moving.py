@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from aliasbench.renderers.geometry import Body
 from aliasbench.renderers.raytrace.cutting import PLACED_PX, cut_about, first_cut
 from aliasbench.renderers.raytrace.exposure import MERGE_LIMIT, Exposure
+from aliasbench.renderers.raytrace.layers import nearest_of_deep, plane_distances
 from aliasbench.renderers.raytrace.start import Spheres
 from aliasbench.renderers.raytrace.tables import Looks, Mesh, Ownership, body_mesh, build_ownership
 from aliasbench.scenes.model import FloatArray, Scene
@@ -46,8 +47,7 @@ class Moving:
         # a large mesh is not worth building anew for every picture
         few = [k for k, mesh in enumerate(self._meshes) if 0 < len(mesh.triangles) <= MERGE_LIMIT]
         self._spheres = Spheres.about([bodies[k] for k in few])
-        ends = [1 if bodies[k].motion.matrices is None else 2 for k in few]
-        self._numbers = np.repeat(np.array(few, dtype=np.int64), ends)
+        self._numbers = np.array(few, dtype=np.int64)[self._spheres.bodies]
         self._whole = self.ownership = build_ownership(self._meshes, placed=placed)
         self._is_whole = False
 
@@ -97,6 +97,9 @@ class Moving:
         nearer = replace(body, origin=body.origin + place, vertices=body.vertices - place, plane=plane)
         whole = replace(mesh, vertices=nearer.vertices)
         nearest = first_cut(whole, view)
+        if view.perspective and body.stacked.any():
+            distances = plane_distances(whole, np.zeros(3), len(self._scene.objects))
+            nearest = min(nearest, nearest_of_deep(whole, body.stacked, distances, np.zeros(3)))
         if nearest == np.inf:
             return None
         others = [self._seen_from(mesh, body, exposure, share) for share in np.linspace(0.0, 1.0, _TIMES).tolist()]

@@ -17,7 +17,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from aliasbench.renderers.frame import Progress
-from aliasbench.renderers.raytrace.bodies import fill_body_rays, to_body
+from aliasbench.renderers.raytrace.bodies import fill_body_rays, has_layer, nearer, to_body
 from aliasbench.renderers.raytrace.cutouts import find_holes
 from aliasbench.renderers.raytrace.film import Film
 from aliasbench.renderers.raytrace.lanes import (
@@ -115,20 +115,42 @@ class _Search:
     nearest: RayArray
     hits: NDArray[np.int32]
 
-    def look(self, body: _Body, rays: RayArray, first: int) -> None:
-        """Take nearer hits on a body, whose triangles are numbered from `first` on, by rays in its frame."""
+    start: float
+
+    def look(self, body: _Body, rays: RayArray, first: int, values: FloatArray | None = None) -> None:
+        """Take nearer hits on a body, whose triangles are numbered from `first` on, by rays in its frame.
+
+        `values` (BODY_SIZE,) are those of one that is not the still mesh.
+        """
         origins, directions = _vectors(rays, RAY_OX), _vectors(rays, RAY_DX)
         distances, found = body.solid.trace(origins, directions, ahead=self.camera[PERSPECTIVE] == 1.0)
+        distances = self._counted(distances, values)
         is_nearer = distances < self.nearest
         self.nearest[is_nearer] = distances[is_nearer]
         self.hits[is_nearer] = first + found[is_nearer]
         if len(body.holed.rows):
-            self._look_through(body.holed, origins, directions, first, np.arange(len(origins)))
+            self._look_through(body.holed, origins, directions, first, np.arange(len(origins)), values)
+
+    def _counted(self, distances: RayArray, values: FloatArray | None) -> RayArray:
+        """Return where hits of a body count, see `bodies.nearer`."""
+        if values is None or not has_layer(values):
+            return distances
+        out: RayArray = np.full_like(distances, np.inf)
+        is_hit = distances < np.inf
+        out[is_hit] = nearer(values, self.start, distances[is_hit].astype(np.float64))
+        return out
 
     def _look_through(
-        self, triangles: _Triangles, origins: RayArray, directions: RayArray, first: int, lanes: NDArray[np.int64]
+        self,
+        triangles: _Triangles,
+        origins: RayArray,
+        directions: RayArray,
+        first: int,
+        lanes: NDArray[np.int64],
+        values: FloatArray | None,
     ) -> None:
         distances, found = triangles.trace(origins[lanes], directions[lanes], ahead=self.camera[PERSPECTIVE] == 1.0)
+        distances = self._counted(distances, values)
         is_nearer = distances < self.nearest[lanes]
         lanes, distances, found = lanes[is_nearer], distances[is_nearer], first + found[is_nearer]
         holes = np.zeros(len(lanes), np.bool_)
@@ -137,7 +159,7 @@ class _Search:
         self.hits[lanes[~holes]] = found[~holes]
         if holes.any():
             for half in triangles.halves():
-                self._look_through(half, origins, directions, first, lanes[holes])
+                self._look_through(half, origins, directions, first, lanes[holes], values)
 
 
 class PortableEngine:
@@ -249,13 +271,13 @@ class PortableEngine:
     ) -> NDArray[np.int32]:
         """Return the triangles hit before the distances `nearest` (n,) by rays from a depth on, (blocks, LANES)."""
         hits = np.full(nearest.shape, MISS, np.int32)
-        search = _Search(tables, camera, scratch, nearest, hits)
+        search = _Search(tables, camera, scratch, nearest, hits, start)
         if self._still is not None:
             search.look(self._still, rays, 0)
         for index, body in enumerate(self._bodies):
             own = rays.copy()
             _make_body_rays(tables.bodies[index], scratch, own, start)
-            search.look(body, own, int(tables.firsts[index]))
+            search.look(body, own, int(tables.firsts[index]), tables.bodies[index])
         return hits.reshape(-1, LANES)
 
     def _check_open(self) -> None:

@@ -11,10 +11,12 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from aliasbench.renderers.geometry import LAYER_STEP
 from aliasbench.renderers.raytrace.cutting import cut_large
 from aliasbench.renderers.raytrace.edge_on import seen_edge_on, through_eye, without
 from aliasbench.renderers.raytrace.exposure import MERGE_LIMIT, Exposure
 from aliasbench.renderers.raytrace.layers import bring_nearer, nearest_of_deep, plane_distances
+from aliasbench.renderers.raytrace.start import MOST_NEARER
 from aliasbench.renderers.raytrace.tables import Looks, Mesh, build_ownership, merge_bodies
 from aliasbench.scenes.model import Scene
 
@@ -32,8 +34,7 @@ class Still:
     placed : bool
         The place of a hit matters.
     lit : bool
-        Light is scattered. It comes from all sides: what the camera does not see has to stay, and layers may not be
-        tilted towards it, as shadow rays start at a polygon's own plane.
+        Light is scattered. It comes from all sides: what the camera does not see has to stay.
     robust : bool
         Whether rays are.
     """
@@ -41,7 +42,6 @@ class Still:
     __slots__ = (
         "_chosen",
         "_key",
-        "_layers",
         "_lit",
         "_looks",
         "_mesh",
@@ -49,8 +49,11 @@ class Still:
         "_placed",
         "_robust",
         "_scene",
+        "_stacked",
+        "_steps",
         "_thin",
         "_through",
+        "_tilts",
         "_whole",
         "ownership",
     )
@@ -85,36 +88,31 @@ class Still:
         self._key, self._through, self._thin = exposure.mesh_key, through, thin
 
     def _merge(self, exposure: Exposure) -> None:
-        camera, bodies = self._scene.camera, exposure.still
-        is_pinhole = camera.projection == "perspective" and camera.lens_radius == 0.0
-        # layers that move are scaled about the eye and not tilted: so all of one plane have to be
-        moving = {body.stack for body in exposure.moving if body.layer}
-        tilted = [is_pinhole and not self._lit and body.layer > 0 and body.stack not in moving for body in bodies]
-        layers = [
-            np.full(len(body.triangles), body.layer * is_tilted, np.int32)
-            for body, is_tilted in zip(bodies, tilted, strict=True)
-        ]
-        self._layers = np.concatenate([np.zeros(0, np.int32), *layers])
-        scaled = [body.layer * (not is_tilted) for body, is_tilted in zip(bodies, tilted, strict=True)]
-        self._whole = merge_bodies(self._scene, self._looks, bodies, exposure.shutter, exposure.anchor, scaled)
+        bodies, share = exposure.still, exposure.shutter.layer_depth
+        is_perspective = self._scene.camera.projection == "perspective"
+        self._stacked = np.concatenate([np.zeros(0, np.bool_), *(body.stacked for body in bodies)]) & is_perspective
+        owned = [len(body.triangles) for body in bodies]
+        self._steps = np.repeat([body.layer * LAYER_STEP * share for body in bodies], owned) * is_perspective
+        self._tilts = np.repeat([body.tilt * share for body in bodies], owned)
+        layers = [0 if is_perspective else body.layer for body in bodies]
+        self._whole = merge_bodies(self._scene, self._looks, bodies, exposure.shutter, exposure.anchor, layers)
         self._of_whole = build_ownership((self._whole,), placed=self._placed)
 
     def _cut(self, exposure: Exposure, through: Numbers) -> None:
         """Make the mesh in which float32 places everything, and note which triangles it consists of parts of."""
         view, anchor = exposure.shutter.first, exposure.anchor
         mesh, chosen = without(self._whole, through) if len(through) else (self._whole, None)
-        distances = nearest = None
-        if self._layers.any():
+        nearest = np.inf
+        if self._stacked.any():
             distances = plane_distances(self._whole, view.origin - anchor, len(self._scene.objects))
-            nearest = nearest_of_deep(self._whole, self._layers, distances, view.origin - anchor)
-        mesh, parents = cut_large(
-            mesh, exposure.anchor_view, anchor, exposure.travel, nearest or np.inf, robust=self._robust
-        )
+            nearest = nearest_of_deep(self._whole, self._stacked, distances, view.origin - anchor)
+        mesh, parents = cut_large(mesh, exposure.anchor_view, anchor, exposure.travel, nearest, robust=self._robust)
         if parents is not None:
             chosen = parents if chosen is None else chosen[parents]
-        if distances is not None:
-            layers = self._layers if chosen is None else self._layers[chosen]
-            mesh = bring_nearer(mesh, layers, distances, view, anchor, exposure.shutter.layer_depth)
+        if self._steps.any():
+            steps, tilts = (v if chosen is None else v[chosen] for v in (self._steps, self._tilts))
+            most = np.inf if exposure.start == 0.0 else MOST_NEARER * exposure.shutter.layer_depth
+            mesh = bring_nearer(mesh, steps, tilts, distances, view, anchor, most)
         self._mesh, self._chosen = mesh, chosen
 
     def _find_through(self, exposure: Exposure) -> Numbers:

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from aliasbench.renderers.geometry import Body
-from aliasbench.renderers.raytrace.bodies import Shutter, layer_matrix
+from aliasbench.renderers.geometry import LAYER_STEP, Body
+from aliasbench.renderers.raytrace.bodies import Shutter
 from aliasbench.renderers.raytrace.lanes import (
     AXIS,
     AXIS_TRAVEL,
@@ -104,7 +104,8 @@ def merge_bodies(
         world = shutter.place(body.motion, scene.animation, shutter.opening)
         matrix = body.local_matrix(world, anchor)
         if layer:
-            matrix = layer_matrix(shutter.first, layer, shutter.layer_depth, anchor) @ matrix
+            # along parallel rays: no point of the picture moves
+            matrix[:3, 3] -= layer * LAYER_STEP * shutter.layer_depth * shutter.first.forward
         vertices.append(body.vertices @ matrix[:3, :3].T + matrix[:3, 3])
         triangles.append(body.triangles + np.int32(count))
         count += len(body.vertices)

@@ -175,7 +175,7 @@ class PreparedRaytrace:
         has_lens = scene.camera.lens_radius > 0.0
         self._is_plain = is_plain(technique, self._optics) and not has_lens and not self._is_scattered
         self._spheres = Spheres.about(self._bodies)
-        exposure = plan_exposure(scene, technique, size, self._bodies, self._spheres, 0)
+        exposure = self._plan(0)
         self._moving = Moving(scene, self._looks, exposure.moving, placed=placed)
         self._moving.place(exposure, engine.set_moving)
         self._still.place(exposure, engine.set_still)
@@ -191,7 +191,7 @@ class PreparedRaytrace:
         """
         started = time.perf_counter()
         technique = self._technique
-        exposure = plan_exposure(self._scene, technique, self._size, self._bodies, self._spheres, frame)
+        exposure = self._plan(frame)
         self._moving.place(exposure, self._engine.set_moving)
         self._still.place(exposure, self._engine.set_still)
         start = frame_key(seed, pattern_frame(technique.reseed, frame))
@@ -199,6 +199,11 @@ class PreparedRaytrace:
         seconds = time.perf_counter() - started
         samples = self._size[0] * self._size[1] * technique.spp if counts is None else int(counts.sum(dtype=np.int64))
         return Frame(pixels, seconds, self._setup_seconds, samples, counts)
+
+    def _plan(self, frame: int) -> Exposure:
+        return plan_exposure(
+            self._scene, self._technique, self._size, self._bodies, self._spheres, frame, lit=self._is_scattered
+        )
 
     def _expose(
         self, exposure: Exposure, start: int, progress: Progress | None

@@ -46,13 +46,14 @@ def test_a_layer_keeps_its_place_in_the_picture_and_its_triangles_stay_together(
     eye = view.origin - anchor
     distances = plane_distances(mesh, eye, 2)
     np.testing.assert_allclose(distances, 2.0, rtol=1e-12)
-    out = bring_nearer(mesh, np.array([0, 3, 3], np.int32), distances, view, anchor, 0.5)
+    layers = np.array([0.0, 1.5, 1.5])
+    out = bring_nearer(mesh, layers * 2.0**-18, layers * 2.0**-19, distances, view, anchor)
     before, after = (m.vertices[m.triangles] + anchor for m in (mesh, out))
     np.testing.assert_array_equal(after[0], before[0])
     np.testing.assert_allclose(view.project(after)[..., :2], view.project(before)[..., :2], atol=1e-9)
     depth, nearer = view.to_camera(before)[1:, :, 2], view.to_camera(after)[1:, :, 2]
-    # k (step + tilt z / d) with k = 3, d = 2, and half of it
-    np.testing.assert_allclose(depth / nearer, 1.0 + 1.5 * 2.0**-18 * (1.0 + depth / 2.0), rtol=1e-12)
+    # step + tilt z / d, d = 2
+    np.testing.assert_allclose(depth / nearer, 1.0 + 1.5 * 2.0**-18 * (1.0 + depth / 4.0), rtol=1e-12)
     # corners 2 and 3 are both triangles': the very same points
     np.testing.assert_array_equal(after[1, 1:], after[2, 1:])
 
@@ -60,9 +61,9 @@ def test_a_layer_keeps_its_place_in_the_picture_and_its_triangles_stay_together(
 def test_what_is_deep_is_known_by_its_height() -> None:
     corners = np.array([(-1.0, -2.0, 0.0), (1.0, -2.0, 0.0), (0.0, -2.0, -100.0)])
     mesh = Mesh(corners, np.array([(0, 1, 2)], np.int32), np.zeros((3, 2)), np.zeros(1, np.int32), np.zeros(1, bool))
-    eye, one = np.zeros(3), np.array([1], np.int32)
+    eye, one = np.zeros(3), np.array([True])
     assert nearest_of_deep(mesh, one, np.array([2.0]), eye) == 2.0
-    assert nearest_of_deep(mesh, np.array([0], np.int32), np.array([2.0]), eye) == np.inf
+    assert nearest_of_deep(mesh, ~one, np.array([2.0]), eye) == np.inf
     assert nearest_of_deep(mesh, one, np.array([20.0]), eye) == np.inf
     # in the plane it is not seen at all
     assert nearest_of_deep(mesh, one, np.array([0.0]), eye) == np.inf
