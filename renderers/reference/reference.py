@@ -33,7 +33,8 @@ from aliasbench.renderers.reference.paths import Paths, scene_paths
 from aliasbench.renderers.reference.snapshots import FlatPictures, LitPictures, Shot, TexturedPictures
 from aliasbench.renderers.sampling.filters import FilterSpec, filter_of
 from aliasbench.renderers.technique import Technique
-from aliasbench.scenes.errors import UnsupportedScene
+from aliasbench.scenes.errors import InputError, UnsupportedScene
+from aliasbench.scenes.limits import LENGTH
 from aliasbench.scenes.model import Checker, ImageTexture, Scene, ZonePlate, content_digest
 from aliasbench.scenes.projection import view_at
 
@@ -222,6 +223,7 @@ def prepare_reference(scene: Scene, technique: Technique, size: tuple[int, int])
     start = time.perf_counter()
     spec = filter_of(technique)
     _refuse_missing(scene)
+    _refuse_beyond(scene)
     scene = paint_constant(scene, linear=technique.texture == "linear")
     drawn = expand(scene, linear=technique.texture == "linear")
     if drawn is None and scene.lights:
@@ -250,6 +252,17 @@ def _brightest(scene: Scene) -> float:
             shown = float(np.max(ends))
         values.append(max(surface.color) * shown)
     return max(values)
+
+
+def _refuse_beyond(scene: Scene) -> None:
+    """Raise for coordinates beyond those of scene files, for which the bounds are not derived."""
+    for index, surface in enumerate(scene.objects):
+        reach = float(np.abs(surface.vertices).max(initial=0.0))
+        if reach > LENGTH:
+            raise InputError(
+                f"reference: object {surface.name or f'number {index}'} reaches {reach:.3g} units from the origin; "
+                f"up to {LENGTH:g} is drawn"
+            )
 
 
 def _refuse_missing(scene: Scene) -> None:

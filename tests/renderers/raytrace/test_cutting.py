@@ -159,3 +159,30 @@ def test_only_flat_objects_are_dropped() -> None:
     left, kept = without(mesh, np.array([0]))
     assert kept.tolist() == [1]
     assert len(left.triangles) == len(left.owners) == 1
+
+
+def test_huge_sheets_seen_askew_end_where_they_end() -> None:
+    """One edge goes through the picture; the rest reaches far, at any angle: what is cut off may not come back in."""
+    rng = np.random.default_rng(11)
+    for number in range(12):
+        far = (1e5, 1e7, 1e8)[number % 3]
+        way = rng.normal(size=3)
+        camera = Camera(
+            "orthographic", tuple(4.0 * way / np.linalg.norm(way)), up=tuple(rng.normal(size=3)), height=2.0
+        )
+        view = view_at(camera, Animation(), 0, 0.0, SIZE)
+        angle, bend = rng.uniform(0.0, 2.0 * np.pi), rng.uniform(-1.0, 1.0, 2)
+        along, off = np.array([np.cos(angle), np.sin(angle)]), rng.uniform(-0.5, 0.5)
+        across = np.array([-along[1], along[0]])
+        ends = [off * across - far * along, off * across + 0.7 * far * along, 0.5 * far * along + far * across,
+                -0.9 * far * along + 0.6 * far * across]  # fmt: skip
+        flat = np.array(ends)
+        corners = flat[:, :1] * view.right + flat[:, 1:] * view.up + (flat @ bend)[:, None] * view.forward
+        # what is before the camera's plane: its depth is 4 in the middle
+        for technique in ("raytrace:", "raytrace:robust=off"):
+            pixels = render(Scene("askew", camera, (polygon(corners),)), technique, size=SIZE).pixels[..., 0]
+            rows, columns = np.indices(pixels.shape)
+            x, y = (columns + 0.5 - SIZE[0] / 2) / view.scale, (SIZE[1] / 2 - rows - 0.5) / view.scale
+            side, depth = x * across[0] + y * across[1] - off, 4.0 + x * bend[0] + y * bend[1]
+            sure = (np.abs(side) * view.scale > 2.0**-7) & (np.abs(depth) > 1e-2)
+            np.testing.assert_array_equal(pixels[sure], ((side > 0.0) & (depth > 0.0))[sure])

@@ -9,7 +9,7 @@ from aliasbench.bench.hard.painting import paint
 from aliasbench.renderers.catalog import render
 from aliasbench.renderers.raytrace.layers import bring_nearer, nearest_of_deep, plane_distances
 from aliasbench.renderers.raytrace.tables import Mesh
-from aliasbench.scenes.model import Animation, Camera, Checker, Motion, Scene
+from aliasbench.scenes.model import Animation, Camera, Checker, Light, Material, Motion, Scene
 from aliasbench.scenes.projection import view_at
 from aliasbench.scenes.shapes import polygon
 
@@ -106,3 +106,42 @@ def test_what_slides_in_a_plane_keeps_its_place_among_what_stands_there(moves: t
     assert covered[SIZE[1] // 2 + 10 :].all()  # below the far edges of the first two
     assert not (pixels == (1.0, 0.0, 1.0)).all(axis=2).any()
     assert (pixels == (1.0, 1.0, 1.0)).all(axis=2).sum() > 20
+
+
+@pytest.mark.parametrize("technique", TRACERS)
+@pytest.mark.parametrize("way", ["flying", "lens", "lit"])
+def test_a_lane_on_a_slope_is_seen_by_any_camera(way: str, technique: str) -> None:
+    """A plane along no axis, 700 heights large: what its corners are rounded by is many layers at the camera's foot."""
+    normal = np.array([0.31, 0.87, 0.22])
+    normal /= np.linalg.norm(normal)
+    ahead = np.cross(normal, (1.0, 0.2, 0.1))
+    ahead /= np.linalg.norm(ahead)
+    right = np.cross(ahead, normal)
+    eye = 1.5 * normal
+
+    def place(points: list[tuple[float, float]]) -> list[tuple[float, float, float]]:
+        return [tuple(x * right + y * ahead) for x, y in points]
+
+    kind = Material("diffuse") if way == "lit" else Material()
+    ground = polygon(
+        place([(-997.0, -1003.0), (1011.0, -989.0), (999.0, 1007.0), (-1013.0, 1001.0)]),
+        color=(1.0, 0.0, 0.0),
+        material=kind,
+    )
+    lane = polygon(
+        place([(-3.1, -20.0), (2.9, -20.0), (2.7, 903.0), (-3.3, 897.0)]), color=(0.0, 1.0, 0.0), material=kind
+    )
+    camera = Camera(
+        "perspective", tuple(eye), tuple(eye + ahead - 0.1 * normal), tuple(normal), fov_y_deg=40.0,
+        velocity=tuple(3.0 * ahead) if way == "flying" else (0.0, 0.0, 0.0),
+        lens_radius=0.01 if way == "lens" else 0.0, focus_distance=8.0 if way == "lens" else None,
+    )  # fmt: skip
+    high = [tuple(np.add(eye, 40.0 * normal + x * right + y * ahead)) for x, y in ((-9, -9), (-9, 9), (9, 9), (9, -9))]
+    lights = (Light(tuple(high), (9.0, 9.0, 9.0)),) if way == "lit" else ()
+    scene = Scene("slope", camera, (ground, lane), lights=lights, animation=Animation(2.0, 2, 1.0))
+    key = "spp=4" if technique.endswith(":") else ",spp=4"
+    pixels = render(scene, technique + key, size=(60, 40)).pixels
+    below = pixels[24:, 15:45]  # of the lane alone: nothing of the ground comes through
+    assert (below[..., 0] == 0.0).all()
+    assert (below[..., 1] > 0.0).all()
+    assert (pixels[24:, :3, 0] > 0.0).any()

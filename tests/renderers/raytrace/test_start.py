@@ -147,3 +147,23 @@ def test_light_from_afar(engine: str) -> None:
     apart = np.abs(pictures[1] - pictures[0]).max(axis=2)
     assert np.median(apart) < 1e-6
     assert (apart > 1e-4).mean() < 0.02
+
+
+@pytest.mark.parametrize("projection", PROJECTIONS)
+def test_what_is_behind_the_camera_or_far_beyond_changes_nothing(projection: str) -> None:
+    distance = 1e7
+    camera = camera_at(projection, distance)
+    view = view_at(camera, Animation(), 0, 0.0, SIZE)
+    middle = camera.position
+
+    def sheet(depth: float, size: float) -> FloatArray:
+        corners = [(-size, -size), (size, -size), (size, size), (-size, size)]
+        return np.array([np.add(middle, depth * view.forward + x * view.right + y * view.up) for x, y in corners])
+
+    behind = polygon(sheet(-0.5 * distance, 3.0), color=(0.3, 0.3, 0.3))
+    backdrop = polygon(sheet(10.0 * distance, 1e3), color=(0.1, 0.2, 0.4))
+    alone = render(Scene("alone", camera, stack(), TEXTURES, background=(0.1, 0.2, 0.4)), "raytrace:", size=SIZE).pixels
+    for more in ((behind,), (backdrop,), (behind, backdrop)):
+        background = (0.1, 0.2, 0.4) if backdrop not in more else (0.0, 0.0, 0.0)
+        scene = Scene("more", camera, (*stack(), *more), TEXTURES, background=background)
+        np.testing.assert_allclose(render(scene, "raytrace:", size=SIZE).pixels, alone, atol=1e-6)

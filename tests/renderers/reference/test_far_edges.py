@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from aliasbench.renderers.catalog import render
+from aliasbench.scenes.errors import InputError
 from aliasbench.scenes.model import Camera, Scene
 from aliasbench.scenes.shapes import polygon
 
@@ -64,3 +65,9 @@ def test_the_bound_holds_where_parallel_rays_begin(reach, steep):
     error = np.abs(frame.pixels[..., 0] - exact_coverage((0.0, 0.25), (8.0, 3.25))).max()
     assert error <= frame.uncertainty
     assert frame.uncertainty <= 1e-12 + 1e-12 * reach * max(1.0, 1.0 / steep)
+
+
+def test_what_reaches_beyond_a_scene_file_s_limits_is_refused():
+    scene = Scene("vast", Camera("orthographic", height=2.0), (polygon([(-1e13, 0, 0), (1e13, 0, 0), (0, 1e13, 0)]),))
+    with pytest.raises(InputError, match=r"object number 0 reaches 1e\+13 units .* up to 1e\+12 is drawn"):
+        render(scene, "reference:", size=(W, H))
