@@ -216,16 +216,14 @@ def _run(options: argparse.Namespace) -> int:
 def _print_table(run: "Run", run_dir: Path) -> None:
     from rich.console import Console
 
-    from aliasbench.bench.table import failure_lines, legend_lines, record_tables
+    from aliasbench.bench.table import failure_lines, legend_lines, record_tables, total_line
 
     width = None if sys.stdout.isatty() else 140
     console = Console(width=width, highlight=False)
     with console.capture() as tables:
         for table in record_tables(run, console.width):
             console.print(table)
-    counts = {s: sum(r["status"] == s for r in run["records"]) for s in ("ok", "failed", "unsupported")}
-    total = ", ".join(f"{count} {status}" for status, count in counts.items())
-    lines = [*legend_lines(run, console.width), *failure_lines(run), f"{printable(str(run_dir))}: {total}"]
+    lines = [*legend_lines(run, console.width), *failure_lines(run), f"{printable(str(run_dir))}: {total_line(run)}"]
     _say(tables.get() + "\n".join(lines))
 
 

@@ -148,3 +148,13 @@ def _number(record: Record, name: str) -> str:
 
 def _is_hidden(score: Mapping[str, object]) -> bool:
     return score["status"] == "below_reference_floor"
+
+
+def total_line(run: Run) -> str:
+    """Return how many cases of a run came out how, and how many of the good ones are known limits."""
+    records = run["records"]
+    counts = {status: sum(r["status"] == status for r in records) for status in ("ok", "failed", "unsupported")}
+    verdicts = [r["metrics"].get(HARD_CASE) for r in records]
+    limits = sum(verdict is not None and verdict["status"] == "limit" for verdict in verdicts)
+    known = f" ({limits} of them known limits)" if limits else ""
+    return ", ".join(f"{count} {status}{known if status == 'ok' else ''}" for status, count in counts.items())

@@ -7,7 +7,7 @@ import pytest
 from rich.console import Console
 
 from aliasbench.bench.export import Record, Run
-from aliasbench.bench.table import failure_lines, legend_lines, record_tables
+from aliasbench.bench.table import failure_lines, legend_lines, record_tables, total_line
 
 
 def record(scene: str, technique: str, **changes: object) -> Record:
@@ -122,3 +122,10 @@ def test_a_reference_that_hides_most_scores_is_named_with_its_uncertainty(
     sentence = "a 8 x 8: its reference is certified to 0.0098, which hides 3 of 5 scores"
     assert (sentence in lines) == bool(said)
     assert len(lines) == 1 + bool(said)
+
+
+def test_the_last_line_tells_how_many_of_the_good_ones_are_limits(run: Run) -> None:
+    assert total_line(run) == "2 ok, 2 failed, 0 unsupported"
+    verdicts = [{"hard_case": {"value": 1e-6, "status": status, "extras": {}}} for status in ("ok", "limit", "limit")]
+    run["records"] = [record("c", str(k), metrics=metrics) for k, metrics in enumerate(verdicts)]
+    assert total_line(run) == "3 ok (2 of them known limits), 0 failed, 0 unsupported"
