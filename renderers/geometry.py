@@ -117,25 +117,28 @@ def _build_body(scene: Scene, motion: Motion, layer: int, tops: NDArray[np.int64
     )
 
 
-def layered_depth(bodies: Sequence[Body], view: View, travel: float = 0.0, start: float = 0.0) -> float:
+def layered_corners(bodies: Sequence[Body]) -> FloatArray:
+    """Return (m, 3, 3): the corners at rest of all triangles that have a layer."""
+    found = [(body.vertices + body.origin)[body.triangles] for body in bodies if body.layer]
+    return np.concatenate([np.zeros((0, 3, 3)), *found])
+
+
+def layered_depth(corners: FloatArray, view: View, travel: float = 0.0, start: float = 0.0) -> float:
     """Return the distance that layers under parallel rays are a share of: the greatest depth, beyond where rays start,
-    or half width of what can be seen, of anything with a layer at rest.
+    or half width of what can be seen, of anything with a layer at rest (`layered_corners`).
 
     What of it is out of sight does not count, or a sheet that reaches far out would be brought behind the camera.
     `travel` is how far the camera may move.
     """
+    if not len(corners):
+        return 1.0
     wide = _WIDEST * (max(view.width, view.height) / view.scale + travel)
-    far = 0.0
-    for body in bodies:
-        if not body.layer or not len(body.triangles):
-            continue
-        place = view.to_camera(body.vertices + body.origin)[body.triangles]
-        normal = np.cross(place[:, 1] - place[:, 0], place[:, 2] - place[:, 0])
-        with np.errstate(divide="ignore", invalid="ignore"):
-            seen = np.abs((normal * place[:, 0]).sum(axis=1)) + wide * np.abs(normal[:, :2]).sum(axis=1)
-            depth = np.fmin(seen / np.abs(normal[:, 2]), np.abs(place[..., 2]).max(axis=1)) - start
-        far = max(far, float(depth.max()), min(wide, float(np.abs(place[..., :2]).max())))
-    return far or 1.0
+    place = view.to_camera(corners)
+    normal = np.cross(place[:, 1] - place[:, 0], place[:, 2] - place[:, 0])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        seen = np.abs((normal * place[:, 0]).sum(axis=1)) + wide * np.abs(normal[:, :2]).sum(axis=1)
+        depth = np.fmin(seen / np.abs(normal[:, 2]), np.abs(place[..., 2]).max(axis=1)) - start
+    return max(0.0, float(depth.max()), min(wide, float(np.abs(place[..., :2]).max()))) or 1.0
 
 
 def coplanar_layers(scene: Scene) -> NDArray[np.int32]:

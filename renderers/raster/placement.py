@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aliasbench.renderers.geometry import Body
+from aliasbench.renderers.geometry import Body, layered_corners
 from aliasbench.scenes.model import Animation, FloatArray, Spin, read_only
 from aliasbench.scenes.motion import object_matrix
 
@@ -27,6 +27,8 @@ class Placement:
     layers : (n,) float64
     planes, tilts : (n, 4), (n,) float64
         Those of layers above 0, see `geometry.Body`.
+    layered : (m, 3, 3) float64
+        See `geometry.layered_corners`.
     velocities, axes, centers : (n, 3) float64
     rates : (n,) float64
         Revolutions per second.
@@ -40,6 +42,7 @@ class Placement:
     layers: FloatArray
     planes: FloatArray
     tilts: FloatArray
+    layered: FloatArray
     velocities: FloatArray
     axes: FloatArray
     centers: FloatArray
@@ -58,6 +61,7 @@ def make_placement(bodies: Sequence[Body]) -> Placement:
         read_only(np.array([float(b.layer) for b in bodies])),
         read_only(np.array([b.plane for b in bodies]).reshape(-1, 4)),
         read_only(np.array([b.tilt for b in bodies])),
+        read_only(layered_corners(bodies)),
         read_only(np.array([b.motion.velocity for b in bodies]).reshape(-1, 3)),
         read_only(axes / np.linalg.norm(axes, axis=1, keepdims=True)),
         read_only(np.array([s.center for s in spins]).reshape(-1, 3)),

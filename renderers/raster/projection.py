@@ -151,7 +151,7 @@ def layer_tilts(scene: Scene, placement: Placement, instant: Instant, size: tupl
     )
     farthest = _farthest(placement, local)
     if not view.perspective:
-        return placement.layers * (-LAYER_STEP * layered_depth(placement.bodies, view) / (_FAR * farthest))
+        return placement.layers * (-LAYER_STEP * layered_depth(placement.layered, view) / (_FAR * farthest))
     heights = np.maximum(_eye_heights(placement.planes, local), _LEAST_HEIGHT * farthest)
     out: FloatArray = placement.tilts * (_NEAR * farthest / heights)
     return out
@@ -165,11 +165,13 @@ def _farthest(placement: Placement, local: FloatArray) -> float:
 
 def _eye_heights(planes: FloatArray, local: FloatArray) -> FloatArray:
     """Return (n,): how far the eye is from planes of bodies, which `local` (n, 4, 4) places relative to the eye."""
-    origins = local[:, :3, 3]
-    # a plane's normal is turned as the inverse's transpose, which a body squeezed flat has not
-    normals = np.einsum("nij,nj->ni", np.linalg.pinv(local[:, :3, :3]).transpose(0, 2, 1), planes[:, :3])
+    a, b, c = (local[:, :3, k] for k in range(3))
+    n = planes[:, :3, None]
+    # a plane's normal is turned by the cofactors, also by a matrix that squeezes a body flat
+    ab, bc, ca = np.cross(a, b), np.cross(b, c), np.cross(c, a)
+    normals = bc * n[:, 0] + ca * n[:, 1] + ab * n[:, 2]
     lengths = np.linalg.norm(normals, axis=1)
-    distance = np.abs(np.einsum("ni,ni->n", normals, origins) + planes[:, 3])
+    distance = np.abs((normals * local[:, :3, 3]).sum(axis=1) + (a * bc).sum(axis=1) * planes[:, 3])
     out: FloatArray = np.divide(distance, lengths, out=np.full_like(lengths, np.inf), where=lengths > 0.0)
     return out
 

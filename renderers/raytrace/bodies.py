@@ -10,6 +10,7 @@ velocity), or at x = (M0 + t M1) b + a0 + a1 t (two matrices). Of coplanar bodie
 rays meet it are compared as if it were nearer (`nearer`), wherever they come from.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -119,14 +120,17 @@ def body_values(scene: Scene, body: Body, shutter: Shutter, anchor: FloatArray) 
 
 def _tilt(body: Body, ends: list[FloatArray], shutter: Shutter, anchor: FloatArray) -> float:
     """Return the share, for each unit of depth, by which a layer is nearer where rays graze its plane."""
-    heights, reach = [], 0.0
+    heights, reach = [], float(np.abs(body.vertices).max())
     for matrix, view in zip(ends, (shutter.first, shutter.last), strict=True):
-        corners = (body.vertices @ matrix[:3, :3].T + matrix[:3, 3] - (view.origin - anchor))[body.triangles]
-        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        largest = int(np.argmax((normal * normal).sum(axis=1)))
-        length = float(np.linalg.norm(normal[largest]))
-        heights.append(abs(float(normal[largest] @ corners[largest, 0])) / length if length > 0.0 else 0.0)
-        reach = max(reach, float(np.abs(corners).max()))
+        place = matrix[:3, 3] - (view.origin - anchor)
+        turn: FloatArray = matrix[:3, :3]
+        if shutter.interpolated or body.motion.matrices is not None:
+            if np.linalg.det(turn) == 0.0:
+                return 0.0  # squeezed flat, its rays hit nothing
+            turn = np.asarray(np.linalg.inv(turn).T, dtype=np.float64)
+        normal = turn @ body.plane[:3]
+        heights.append(abs(float(normal @ place) + float(body.plane[3])) / math.sqrt(float(normal @ normal)))
+        reach = max(reach, float(np.abs(place).max()))
     # in the plane but for rounding, it is seen as a line
     height = max(min(heights), LEAST_HEIGHT * reach)
     return body.tilt * shutter.layer_depth / height if height > 0.0 else 0.0

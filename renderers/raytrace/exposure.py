@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aliasbench.renderers.geometry import Body, layered_depth
+from aliasbench.renderers.geometry import Body, layered_corners, layered_depth
 from aliasbench.renderers.raytrace.bodies import Shutter
 from aliasbench.renderers.raytrace.start import Spheres, find_start
 from aliasbench.renderers.technique import Technique
@@ -77,7 +77,7 @@ def plan_exposure(
     anchor_view = view_at(scene.camera, scene.animation, anchor_frame, 0.0, size)
     anchor = anchor_view.origin + start * anchor_view.forward
     travel = 0.0 if not any(scene.camera.velocity) else _reach(scene)
-    depth = share if first.perspective else layered_depth(bodies, first, travel, start)
+    depth = share if first.perspective else layered_depth(layered_corners(bodies), first, travel, start)
     is_matrix = technique.motion == "matrix"
     shutter = Shutter(frame, opening, closing, first, last, depth, scene.camera.lens_radius, is_matrix)
     # a layer above others is brought towards the eye in one mesh with them, where all rays come from one eye
